@@ -1,6 +1,6 @@
 //! `--table accuracy`: the table that needle papers print.
 
-use crate::support::{Bench, SMALL};
+use crate::support::{Bench, Json, SMALL};
 
 /// A study of postures only, over two sizes and a sampled place.
 const STUDY: &str = "name = \"places\"\nscenario = \"s.toml\"\nmode = \"static\"\nreplanned_cases = 0\n\
@@ -9,7 +9,7 @@ const STUDY: &str = "name = \"places\"\nscenario = \"s.toml\"\nmode = \"static\"
     [[factors]]\nname = \"along\"\nkey = \"phantom.position_mm[0]\"\nrelative = true\nrange = [-2, 2]\n";
 
 fn rows(bench: &Bench, file: &str) -> Vec<Vec<String>> {
-    let text = String::from_utf8(bench.read(file)).unwrap();
+    let text = bench.text(file);
     let lines = text.lines();
     lines
         .map(|line| line.split(',').map(str::to_owned).collect())
@@ -19,16 +19,9 @@ fn rows(bench: &Bench, file: &str) -> Vec<Vec<String>> {
 #[test]
 fn a_run_leaves_the_table_in_three_formats_and_takes_it_away_again() {
     let bench = Bench::with_scenario(SMALL);
-    let run = ["run", "s.toml", "--engine", "rapier", "--quiet"];
-    let table = [
-        "--table",
-        "accuracy",
-        "--by",
-        "configuration",
-        "--hit-radius",
-        "0.5",
-    ];
-    let answer = bench.run(&[&run[..], &table[..]].concat()).exits_with(0);
+    let run = "run s.toml --engine rapier --quiet";
+    let table = "--table accuracy --by configuration --hit-radius 0.5";
+    let answer = bench.run(format!("{run} {table}")).exits_with(0);
     for part in [
         "before insertion (robot and registration)",
         "nothing of a real arm's accuracy",
@@ -49,7 +42,7 @@ fn a_run_leaves_the_table_in_three_formats_and_takes_it_away_again() {
     }
     let csv = rows(&bench, "out/small/accuracy.csv");
     let report = bench.read_json("out/small/report.json");
-    let configurations = report["goals"][0]["configurations"].as_array().unwrap();
+    let configurations = report["goals"][0]["configurations"].list();
     let working: Vec<_> = configurations
         .iter()
         .filter(|each| each["status"] != "rejected")
@@ -61,7 +54,7 @@ fn a_run_leaves_the_table_in_three_formats_and_takes_it_away_again() {
         .unwrap();
     for (row, configuration) in csv[1..].iter().zip(&working) {
         assert_eq!(row[0], configuration["label"]);
-        let expected_mm = 1e3 * configuration["metrics"]["tip_error"].as_f64().unwrap();
+        let expected_mm = 1e3 * configuration["metrics"]["tip_error"].number();
         let found: f64 = row[at].parse().unwrap();
         assert!(
             (found - expected_mm).abs() <= 1e-15 * expected_mm.abs(),
@@ -82,16 +75,7 @@ fn a_run_leaves_the_table_in_three_formats_and_takes_it_away_again() {
 fn a_study_of_postures_says_so_and_counts_each_case_once() {
     let bench = Bench::with_scenario(SMALL);
     bench.write("study.toml", STUDY);
-    let study = [
-        "study",
-        "study.toml",
-        "--quiet",
-        "--no-page",
-        "--table",
-        "accuracy",
-        "--by",
-        "roll",
-    ];
+    let study = "study study.toml --quiet --no-page --table accuracy --by roll";
     let answer = bench.run(&study).exits_with(0);
     let words: Vec<&str> = answer.stdout.split_whitespace().collect();
     assert!(

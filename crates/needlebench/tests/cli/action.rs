@@ -38,7 +38,7 @@ fn script(bench: &Bench, part: &str, variables: &[(&str, &str)]) -> Step {
         .envs(variables.iter().copied())
         .output()
         .unwrap();
-    let text = |name: &str| String::from_utf8(bench.read(name)).unwrap();
+    let text = |name: &str| bench.text(name);
     Step {
         status: output.status.code().unwrap(),
         printed: String::from_utf8(output.stdout).unwrap()
@@ -156,7 +156,7 @@ fn the_release_of_the_actions_own_version_is_installed_if_it_is_what_was_release
         assert_eq!(step.status, 0, "{}", step.printed);
         assert!(step.printed.contains("installed needlebench 9.8.7"));
         assert!(step.outputs.contains("version=9.8.7\n"), "{}", step.outputs);
-        let path = String::from_utf8(bench.read("path")).unwrap();
+        let path = bench.text("path");
         assert!(Path::new(path.trim()).join("needlebench").is_file());
         fs::remove_dir_all(path.trim()).unwrap();
     }

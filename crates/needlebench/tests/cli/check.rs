@@ -1,6 +1,6 @@
 //! `check`.
 
-use crate::support::{Bench, SMALL, files, has_keys, with_edit, workspace};
+use crate::support::{Bench, Json, SMALL, files, has_keys, holds, with_edit, workspace};
 
 #[test]
 fn every_shipped_scenario_is_sound() {
@@ -9,7 +9,8 @@ fn every_shipped_scenario_is_sound() {
     assert!(!scenarios.is_empty());
     for scenario in scenarios {
         let path = scenario.display().to_string();
-        let answer = bench.run(&["check", &path, "--json"]).exits_with(0).json();
+        let answer = bench.run(format!("check '{path}' --json"));
+        let answer = answer.exits_with(0).json();
         assert_eq!(answer["ok"], true, "{path}");
     }
 }
@@ -29,16 +30,15 @@ fn every_shipped_scenario_points_editors_at_the_schema() {
 #[test]
 fn sound_scenario_has_no_findings() {
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["check", "s.toml", "--json"]).exits_with(0);
+    let answer = bench.run("check s.toml --json").exits_with(0);
     let answer = answer.json();
-    has_keys(&answer, &["schema_version", "ok", "findings"]);
-    assert_eq!(answer["findings"].as_array().unwrap().len(), 0);
-    let answer = bench.run(&["check", "s.toml"]).exits_with(0);
+    has_keys(&answer, "schema_version ok findings");
+    assert_eq!(answer["findings"].list().len(), 0);
+    let answer = bench.run("check s.toml").exits_with(0);
     assert!(answer.stdout.starts_with("s.toml: ok"), "{answer:#?}");
     // Without a name of its own it has its file's.
     bench.write("short.toml", "[[goals]]\nlesion = \"right_upper_lobe\"\n");
-    let answer = bench.run(&["check", "short.toml", "--json"]);
-    let answer = answer.exits_with(0).json();
+    let answer = bench.run("check short.toml --json").exits_with(0).json();
     assert_eq!(answer["scenarios"][0]["name"], "short");
 }
 
@@ -51,17 +51,14 @@ fn findings_of_all_files_and_values_come_together() {
         with_edit(&text, "period_ms = 50", "period_ms = -1"),
     );
     bench.write("b.toml", with_edit(SMALL, "hold_s", "hold"));
-    let answer = bench.run(&["check", "a.toml", "s.toml", "b.toml", "--json"]);
+    let answer = bench.run("check a.toml s.toml b.toml --json");
     let answer = answer.exits_with(2).json();
-    let findings = answer["findings"].as_array().unwrap();
+    let findings = answer["findings"].list();
     let keys: Vec<(&str, &str)> = findings
         .iter()
         .map(|each| {
-            has_keys(each, &["file", "line", "key", "message", "hint"]);
-            (
-                each["file"].as_str().unwrap(),
-                each["key"].as_str().unwrap(),
-            )
+            has_keys(each, "file line key message hint");
+            (each["file"].word(), each["key"].word())
         })
         .collect();
     assert_eq!(
@@ -93,7 +90,7 @@ error: motion.hold_ss: unknown key `hold_ss`
 
 "
     );
-    let answer = bench.run(&["check", "s.toml"]).exits_with(2);
+    let answer = bench.run("check s.toml").exits_with(2);
     assert_eq!(answer.stderr, expected);
     assert_eq!(answer.stdout, "");
 }
@@ -101,11 +98,11 @@ error: motion.hold_ss: unknown key `hold_ss`
 #[test]
 fn every_command_that_reads_scenarios_refuses_a_bad_one_alike() {
     let bench = Bench::with_scenario(&with_edit(SMALL, "hold_s", "hold_ss"));
-    let expected = bench.run(&["check", "s.toml"]).stderr;
+    let expected = bench.run("check s.toml").stderr;
     for arguments in [
-        &["run", "s.toml"][..],
-        &["ik", "s.toml", "--goal", "pose"],
-        &["clearance", "s.toml", "--joints", "0,0,0,0,0,0"],
+        "run s.toml",
+        "ik s.toml --goal pose",
+        "clearance s.toml --joints 0,0,0,0,0,0",
     ] {
         let answer = bench.run(arguments).exits_with(2);
         assert_eq!(answer.stderr, expected, "{arguments:?}");
@@ -123,17 +120,14 @@ fn shipped(name: &str, from: &str, to: &str) -> String {
 #[test]
 fn reach_route_start_and_target_are_known_without_a_simulation() {
     let bench = Bench::with_scenario(&shipped("supine_suite.toml", "seed = 1", "seed = 2"));
-    let answer = bench
-        .run(&["check", "s.toml", "--json"])
-        .exits_with(0)
-        .json();
+    let answer = bench.run("check s.toml --json").exits_with(0).json();
     let scenario = &answer["scenarios"][0];
     assert_eq!(scenario["basis"], "postures only, motions not planned");
-    assert!(scenario["start"]["least_clearance_m"].as_f64().unwrap() > 0.0);
-    let goals = scenario["goals"].as_array().unwrap();
+    assert!(scenario["start"]["least_clearance_m"].number() > 0.0);
+    let goals = scenario["goals"].list();
     assert_eq!(goals.len(), 4);
     for goal in goals {
-        let all = goal["configurations"].as_array().unwrap();
+        let all = goal["configurations"].list();
         let works = |each: &&serde_json::Value| each["works"] == true;
         assert_eq!(all.len(), 8);
         assert_eq!(goal["working"], all.iter().filter(works).count());
@@ -142,19 +136,18 @@ fn reach_route_start_and_target_are_known_without_a_simulation() {
             "as the scenario wants"
         );
         for each in all {
-            let says_why =
-                !each["rejections"].as_array().unwrap().is_empty() || each["missed"].is_string();
+            let says_why = !each["rejections"].list().is_empty() || each["missed"].is_string();
             assert_eq!(each["works"] == false, says_why, "{each}");
         }
         // What its comments say: ribs are 4.7 mm away and more.
-        assert!(goal["needle_route"]["distance_m"].as_f64().unwrap() > 4e-3);
+        assert!(goal["needle_route"]["distance_m"].number() > 4e-3);
         assert_eq!(goal["needle_route"]["kept"], true);
         assert!(goal["target"]["lesion"].is_string());
     }
-    let text = bench.run(&["check", "s.toml"]).exits_with(0).stdout;
-    assert!(
-        text.contains("8 configurations can work (postures only, motions not planned)"),
-        "{text}"
+    let text = bench.run("check s.toml").exits_with(0).stdout;
+    holds(
+        &text,
+        ["8 configurations can work (postures only, motions not planned)"],
     );
     assert!(text.contains("needle route: "), "{text}");
 }
@@ -167,41 +160,27 @@ fn a_goal_out_of_reach_is_a_finding_with_what_is_missing() {
         "[-280, 900, 1050]",
     );
     let bench = Bench::with_scenario(&text);
-    let answer = bench
-        .run(&["check", "s.toml", "--json"])
-        .exits_with(2)
-        .json();
+    let answer = bench.run("check s.toml --json").exits_with(2).json();
     assert_eq!(answer["ok"], false);
-    let findings = answer["findings"].as_array().unwrap();
+    let findings = answer["findings"].list();
     assert_eq!(findings.len(), 4, "{findings:?}");
     let line = 1 + text
         .lines()
         .position(|line| line.starts_with("entry_mm"))
         .unwrap();
-    let message = findings[0]["message"].as_str().unwrap();
-    assert!(
-        message.contains("out of reach") && message.contains("mm or more are missing"),
-        "{message}"
-    );
+    let message = findings[0]["message"].word();
+    holds(&message, ["out of reach", "mm or more are missing"]);
     assert_eq!(findings[0]["key"], "goals[0].entry_mm");
     assert_eq!(findings[0]["line"], line);
     // A run says the same, configuration by configuration.
-    let report = bench.run(&[
-        "run",
-        "s.toml",
-        "--engine",
-        "rapier",
-        "--json",
-        "--no-pictures",
-    ]);
+    let report = bench.run("run s.toml --engine rapier --json --no-pictures");
     let report = report.exits_with(1).json();
     let least_m = report["goals"][0]["configurations"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
         .map(|each| {
             assert_eq!(each["rejections"][0]["rule"], "unreachable");
-            each["rejections"][0]["value"].as_f64().unwrap()
+            each["rejections"][0]["value"].number()
         })
         .fold(f64::INFINITY, f64::min);
     assert!(
@@ -219,15 +198,9 @@ fn a_route_through_bone_is_a_finding() {
         "[-108.9, -76.4, 75.8]",
     );
     let bench = Bench::with_scenario(&text);
-    let answer = bench
-        .run(&["check", "s.toml", "--json"])
-        .exits_with(2)
-        .json();
-    let findings = answer["findings"].as_array().unwrap();
-    let message = findings[0]["message"].as_str().unwrap();
-    assert!(
-        message.contains("needle") && message.contains("rib_"),
-        "{message}"
-    );
+    let answer = bench.run("check s.toml --json").exits_with(2).json();
+    let findings = answer["findings"].list();
+    let message = findings[0]["message"].word();
+    holds(&message, ["needle", "rib_"]);
     assert_eq!(findings[0]["key"], "goals[0].entry_mm");
 }

@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use crate::support::{Bench, SMALL, has_keys, numbers};
+use crate::support::{Bench, Json, SMALL, has_keys, numbers};
 
 const POSTURE: &str = "0,-1.57,-1,-1.57,1.57,0";
 
 fn answer() -> Value {
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["clearance", "s.toml", "--joints", POSTURE, "--json"]);
+    let answer = bench.run(format!("clearance s.toml --joints {POSTURE} --json"));
     answer.exits_with(0).json()
 }
 
@@ -24,13 +24,13 @@ const ROUNDING_M: f64 = 1e-9;
 #[test]
 fn every_pair_is_listed_once_with_points_as_far_apart_as_its_distance() {
     let answer = answer();
-    has_keys(&answer, &["schema_version", "classes", "pairs"]);
+    has_keys(&answer, "schema_version classes pairs");
     let mut seen = BTreeSet::new();
-    for pair in answer["pairs"].as_array().unwrap() {
-        has_keys(pair, &["pair", "class", "distance_m", "witness_points_m"]);
+    for pair in answer["pairs"].list() {
+        has_keys(pair, "pair class distance_m witness_points_m");
         let key = (pair["pair"].to_string(), pair["class"].to_string());
         assert!(seen.insert(key), "{pair:#} is listed twice");
-        let distance_m = pair["distance_m"].as_f64().unwrap();
+        let distance_m = pair["distance_m"].number();
         let [a, b] = [0, 1].map(|end| point(&pair["witness_points_m"][end]));
         let apart_m = (0..3)
             .map(|axis| (a[axis] - b[axis]).powi(2))
@@ -47,15 +47,14 @@ fn class_minima_are_the_least_of_their_pairs() {
     let answer = answer();
     let classes = answer["classes"].as_object().unwrap();
     for (class, found) in classes {
-        has_keys(found, &["minimum_m", "pair", "witness_points_m"]);
+        has_keys(found, "minimum_m pair witness_points_m");
         let least = answer["pairs"]
-            .as_array()
-            .unwrap()
+            .list()
             .iter()
             .filter(|pair| pair["class"] == class.as_str())
-            .map(|pair| pair["distance_m"].as_f64().unwrap())
+            .map(|pair| pair["distance_m"].number())
             .fold(f64::INFINITY, f64::min);
-        let minimum_m = found["minimum_m"].as_f64().unwrap();
+        let minimum_m = found["minimum_m"].number();
         assert!(
             (minimum_m - least).abs() < ROUNDING_M,
             "{class}: {minimum_m} {least}"

@@ -1,18 +1,19 @@
 //! `compare`: results, folders and scenarios side by side.
 
+use std::fmt::Display;
 use std::sync::OnceLock;
 
 use needlebench_evaluation::metric::{Metric, MetricKey};
 use serde_json::{Value, json};
 
-use crate::support::{Answer, Bench, SMALL, has_keys, with_edit};
+use crate::support::{Answer, Bench, Json, SMALL, has_keys, holds, with_edit};
 
 /// The report of `SMALL` in rapier, as text.
 fn report() -> &'static str {
     static REPORT: OnceLock<String> = OnceLock::new();
     REPORT.get_or_init(|| {
         let bench = Bench::with_scenario(SMALL);
-        let answer = bench.run(&["run", "s.toml", "--engine", "rapier", "--json"]);
+        let answer = bench.run("run s.toml --engine rapier --json");
         answer.exits_with(0).stdout
     })
 }
@@ -27,10 +28,8 @@ fn bench(change: impl FnOnce(&mut Value)) -> Bench {
     bench
 }
 
-fn compare(bench: &Bench, more: &[&str]) -> Answer {
-    let mut arguments = vec!["compare", "a.json", "b.json"];
-    arguments.extend(more);
-    bench.run(&arguments)
+fn compare(bench: &Bench, more: impl Display) -> Answer {
+    bench.run(format!("compare a.json b.json {more}"))
 }
 
 /// Makes the arm of configuration 0 come this near to the skin.
@@ -46,51 +45,30 @@ fn nearer(report: &mut Value, clearance_m: f64) {
 #[test]
 fn result_against_itself_passes_and_lists_nothing() {
     let bench = bench(|_| ());
-    let text = compare(&bench, &["--max-loss", "clearance=0mm"]).exits_with(0);
-    assert!(text.stdout.contains("PASS"), "{text:#?}");
+    let text = compare(&bench, "--max-loss clearance=0mm").exits_with(0);
+    text.says(["PASS"]);
     assert!(!text.stdout.contains('─'), "{text:#?}");
     assert_eq!(text.stderr, "");
-    let all = compare(&bench, &["--all"]).exits_with(0).stdout;
-    assert!(all.contains("tip error") && all.contains("same"), "{all}");
+    let all = compare(&bench, "--all").exits_with(0).stdout;
+    holds(&all, ["tip error", "same"]);
 }
 
 #[test]
 fn document_has_its_keys_and_si_units() {
     let bench = bench(|report| nearer(report, 0.001));
-    let answer = compare(&bench, &["--json"]).exits_with(0).json();
+    let answer = compare(&bench, "--json").exits_with(0).json();
     has_keys(
         &answer,
-        &[
-            "schema_version",
-            "pass",
-            "failures",
-            "a",
-            "b",
-            "provenance_differences",
-            "goals",
-        ],
+        "schema_version pass failures a b provenance_differences goals",
     );
-    let configurations = answer["goals"][0]["configurations"].as_array().unwrap();
+    let configurations = answer["goals"][0]["configurations"].list();
     assert_eq!(configurations.len(), 8);
     let found = configurations[0]["metrics"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
         .find(|found| found["metric"] == "arm_to_skin")
         .unwrap();
-    has_keys(
-        found,
-        &[
-            "metric",
-            "unit",
-            "a",
-            "b",
-            "change",
-            "relative",
-            "resolution",
-            "outcome",
-        ],
-    );
+    has_keys(found, "metric unit a b change relative resolution outcome");
     assert_eq!((&found["unit"], &found["b"]), (&json!("m"), &json!(0.001)));
     assert_eq!(found["outcome"], "worse");
 }
@@ -98,33 +76,18 @@ fn document_has_its_keys_and_si_units() {
 #[test]
 fn loss_beyond_its_threshold_exits_with_1_and_is_written_for_ci() {
     let bench = bench(|report| nearer(report, 0.001));
-    compare(&bench, &["--max-loss", "arm_to_skin=1m"]).exits_with(0);
+    compare(&bench, "--max-loss arm_to_skin=1m").exits_with(0);
     let answer = compare(
         &bench,
-        &[
-            "--max-loss",
-            "arm_to_skin=1mm",
-            "--junit",
-            "j.xml",
-            "--markdown",
-            "m.md",
-        ],
+        "--max-loss arm_to_skin=1mm --junit j.xml --markdown m.md",
     );
     let answer = answer.exits_with(1);
-    assert!(
-        answer
-            .stdout
-            .contains("FAILED pose Right-Down-Fold: arm to skin: "),
-        "{answer:#?}"
-    );
-    let junit = String::from_utf8(bench.read("j.xml")).unwrap();
+    answer.says(["FAILED pose Right-Down-Fold: arm to skin: "]);
+    let junit = bench.text("j.xml");
     assert_eq!(junit.matches("<failure").count(), 1, "{junit}");
     assert!(junit.contains("tests=\"10\""), "{junit}");
-    let markdown = String::from_utf8(bench.read("m.md")).unwrap();
-    assert!(
-        markdown.contains("**fail**") && markdown.contains("| worse |"),
-        "{markdown}"
-    );
+    let markdown = bench.text("m.md");
+    holds(&markdown, ["**fail**", "| worse |"]);
 }
 
 #[test]
@@ -134,23 +97,20 @@ fn status_that_got_worse_exits_with_1_unless_that_is_allowed() {
         configuration["status"] = json!("rejected");
         configuration["rejections"] = json!([{"rule": "collision", "detail": "forearm and skin"}]);
     });
-    let answer = compare(&bench, &["--wide"]).exits_with(1);
+    let answer = compare(&bench, "--wide").exits_with(1);
     let line = "Right-Up-Fold: worse: ok -> rejected (collision: forearm and skin)";
     assert!(answer.stdout.contains(line), "{answer:#?}");
-    compare(&bench, &["--allow-status-change"]).exits_with(0);
+    compare(&bench, "--allow-status-change").exits_with(0);
 }
 
 #[test]
 fn goal_with_another_name_is_matched_when_told() {
     let bench = bench(|report| report["goals"][0]["name"] = json!("entry"));
-    let answer = compare(&bench, &[]).exits_with(2);
+    let answer = compare(&bench, "").exits_with(2);
     answer.complains(["no goal in common", "pose", "entry", "--goal A=B"]);
-    let answer = compare(&bench, &["--goal", "pose=entry", "--wide"]).exits_with(0);
-    assert!(
-        answer.stdout.contains("goal pose, in B entry"),
-        "{answer:#?}"
-    );
-    compare(&bench, &["--goal", "pose=entri"])
+    let answer = compare(&bench, "--goal pose=entry --wide").exits_with(0);
+    answer.says(["goal pose, in B entry"]);
+    compare(&bench, "--goal pose=entri")
         .exits_with(2)
         .complains(["`entri`"]);
 }
@@ -159,14 +119,9 @@ fn goal_with_another_name_is_matched_when_told() {
 fn thresholds_come_from_a_file_too_and_the_command_line_goes_before_it() {
     let bench = bench(|report| nearer(report, 0.001));
     bench.write("limits.toml", "[max_loss]\narm_to_skin = \"1mm\"\n");
-    compare(&bench, &["--thresholds", "limits.toml"]).exits_with(1);
-    let more = [
-        "--thresholds",
-        "limits.toml",
-        "--max-loss",
-        "arm_to_skin=1m",
-    ];
-    compare(&bench, &more).exits_with(0);
+    compare(&bench, "--thresholds limits.toml").exits_with(1);
+    let more = "--thresholds limits.toml --max-loss arm_to_skin=1m";
+    compare(&bench, more).exits_with(0);
 }
 
 #[test]
@@ -175,7 +130,7 @@ fn reports_that_cannot_be_used_are_refused_with_file_and_line() {
     let half: String = report().lines().take(40).collect::<Vec<_>>().join("\n");
     bench.write("half.json", half);
     bench
-        .run(&["compare", "a.json", "half.json"])
+        .run("compare a.json half.json")
         .exits_with(2)
         .complains(["half.json:40", "ends too early", "line 40 column"]);
 }
@@ -187,8 +142,8 @@ fn folder_of_several_results_is_answered_with_one_to_try() {
         std::fs::create_dir_all(bench.path("out").join(name)).unwrap();
         bench.write(&format!("out/{name}/report.json"), report());
     }
-    bench.run(&["compare", "a.json", "out/one"]).exits_with(0);
-    let answer = bench.run(&["compare", "a.json", "out"]).exits_with(2);
+    bench.run("compare a.json out/one").exits_with(0);
+    let answer = bench.run("compare a.json out").exits_with(2);
     answer.complains(["several scenarios", "out/one"]);
 }
 
@@ -198,12 +153,12 @@ fn scenarios_are_run_and_two_layouts_differ_by_their_input() {
     bench.write("s.toml", SMALL);
     // What is run now is what was stored.
     let answer = bench
-        .run(&["compare", "a.json", "s.toml", "--json"])
+        .run("compare a.json s.toml --json")
         .exits_with(0)
         .json();
     assert_eq!(answer["provenance_differences"], json!([]));
-    for each in answer["goals"][0]["configurations"].as_array().unwrap() {
-        for found in each["metrics"].as_array().unwrap() {
+    for each in answer["goals"][0]["configurations"].list() {
+        for found in each["metrics"].list() {
             assert_eq!(found["outcome"], "same", "{found:#}");
         }
     }
@@ -215,12 +170,10 @@ fn scenarios_are_run_and_two_layouts_differ_by_their_input() {
             "position_mm = [155.0, -609.5, -1.5]",
         ),
     );
-    let answer = bench.run(&["compare", "s.toml", "lower.toml", "--json"]);
+    let answer = bench.run("compare s.toml lower.toml --json");
     let answer = answer.exits_with(0).json();
     assert_eq!(answer["provenance_differences"][0]["what"], "scenario");
-    let changed = answer["goals"][0]["configurations"][0]["metrics"]
-        .as_array()
-        .unwrap();
+    let changed = answer["goals"][0]["configurations"][0]["metrics"].list();
     let skin = changed
         .iter()
         .find(|found| found["metric"] == "tool_to_skin")
@@ -246,18 +199,15 @@ fn report_of_a_version_before_rankings_is_read() {
             }
         }
     });
-    let answer = bench.run(&["compare", "b.json", "a.json", "--wide"]);
+    let answer = bench.run("compare b.json a.json --wide");
     let answer = answer.exits_with(0);
-    assert!(answer.stdout.contains("new"), "{answer:#?}");
-    compare(&bench, &["--max-loss", "motion_time=1s"]).exits_with(1);
+    answer.says(["new"]);
+    compare(&bench, "--max-loss motion_time=1s").exits_with(1);
 }
 
 #[test]
 fn help_lists_every_metric() {
-    let help = Bench::new()
-        .run(&["compare", "--help"])
-        .exits_with(0)
-        .stdout;
+    let help = Bench::new().run("compare --help").exits_with(0).stdout;
     for metric in MetricKey::all(&["rapier", "mujoco"]) {
         let listed = help
             .split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
@@ -273,43 +223,23 @@ fn ranking_of_a_scenario_is_stated_with_every_term() {
     let ranking = &goal["ranking"];
     has_keys(
         ranking,
-        &[
-            "order",
-            "pareto_set",
-            "metrics",
-            "runner_up",
-            "smallest_weight_change",
-        ],
+        "order pareto_set metrics runner_up smallest_weight_change",
     );
     assert_eq!(ranking["order"][0], goal["recommended"]["label"]);
-    for each in goal["configurations"].as_array().unwrap() {
+    for each in goal["configurations"].list() {
         has_keys(
             each,
-            &[
-                "ranking",
-                "pareto",
-                "dominated_by",
-                "room",
-                "tip_sensitivity_m_per_rad",
-            ],
+            "ranking pareto dominated_by room tip_sensitivity_m_per_rad",
         );
         if each["status"] != "ok" {
             assert_eq!(each["ranking"], Value::Null);
             continue;
         }
-        has_keys(&each["ranking"], &["rank", "score", "terms"]);
-        for term in each["ranking"]["terms"].as_array().unwrap() {
+        has_keys(&each["ranking"], "rank score terms");
+        for term in each["ranking"]["terms"].list() {
             has_keys(
                 term,
-                &[
-                    "metric",
-                    "value",
-                    "counted_as",
-                    "unit",
-                    "utility",
-                    "weight",
-                    "contribution",
-                ],
+                "metric value counted_as unit utility weight contribution",
             );
         }
     }
@@ -319,7 +249,7 @@ fn ranking_of_a_scenario_is_stated_with_every_term() {
 fn weights_of_the_scenario_change_the_choice_and_wrong_ones_are_refused() {
     let ranked = |section: &str| {
         let text = with_edit(SMALL, "[recording]", &format!("{section}\n[recording]"));
-        Bench::with_scenario(&text).run(&["run", "s.toml", "--engine", "rapier", "--json"])
+        Bench::with_scenario(&text).run("run s.toml --engine rapier --json")
     };
     // Of the time alone the fastest is the best.
     let report: Value = serde_json::from_str(report()).unwrap();
@@ -327,8 +257,8 @@ fn weights_of_the_scenario_change_the_choice_and_wrong_ones_are_refused() {
         "[ranking]".to_owned(),
         "motion_time_s.best = 0.01".to_owned(),
     ];
-    for metric in report["goals"][0]["ranking"]["metrics"].as_array().unwrap() {
-        let name = metric["name"].as_str().unwrap();
+    for metric in report["goals"][0]["ranking"]["metrics"].list() {
+        let name = metric["name"].word();
         let key = Metric::of_key(name).unwrap().ranking_key.unwrap();
         if key != "motion_time_s" {
             others.push(format!("{key}.weight = 0"));
@@ -341,7 +271,7 @@ fn weights_of_the_scenario_change_the_choice_and_wrong_ones_are_refused() {
         let term = terms.iter().find(|term| term["metric"] == "motion_time")?;
         term["counted_as"].as_f64()
     };
-    let configurations = goal["configurations"].as_array().unwrap();
+    let configurations = goal["configurations"].list();
     let least = configurations
         .iter()
         .filter_map(time_s)

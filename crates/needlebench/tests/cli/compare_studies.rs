@@ -1,10 +1,11 @@
 //! `compare` of two studies: folders and tables side by side.
 
+use std::fmt::Display;
 use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::support::{Answer, Bench, SMALL, has_keys, with_edit};
+use crate::support::{Answer, Bench, Json, SMALL, has_keys, holds, with_edit};
 
 const STUDY: &str = r#"
 name = "shifted"
@@ -37,7 +38,7 @@ fn tables() -> &'static [Vec<u8>; 3] {
                 study.replace("method = \"sobol\"", "method = \"random\""),
             );
             bench
-                .run(&["study", "study.toml", "--out", "out", "--quiet"])
+                .run("study study.toml --out out --quiet")
                 .exits_with(0);
             bench.read("out/shifted/results.parquet")
         })
@@ -56,28 +57,18 @@ fn bench() -> Bench {
     bench
 }
 
-fn compare(bench: &Bench, more: &[&str]) -> Answer {
-    let mut arguments = vec!["compare", "a", "lower", "--allow-status-change"];
-    arguments.extend(more);
-    bench.run(&arguments)
+fn compare(bench: &Bench, more: impl Display) -> Answer {
+    bench.run(format!("compare a lower --allow-status-change {more}"))
 }
 
 #[test]
 fn study_against_itself_passes() {
     let bench = bench();
-    let more = [
-        "--max-loss",
-        "clearance=0mm",
-        "--max-loss",
-        "success_rate=0",
-    ];
-    let answer = bench.run(&[&["compare", "a", "a/results.parquet"][..], &more].concat());
+    let more = "--max-loss clearance=0mm --max-loss success_rate=0";
+    let answer = bench.run(format!("compare a a/results.parquet {more}"));
     let answer = answer.exits_with(0);
-    assert!(
-        answer.stdout.contains("the same 64 cases in both"),
-        "{answer:#?}"
-    );
-    assert!(answer.stdout.contains("PASS"), "{answer:#?}");
+    answer.says(["the same 64 cases in both"]);
+    answer.says(["PASS"]);
     assert!(!answer.stdout.contains('─'), "{answer:#?}");
     assert_eq!(answer.stderr, "");
 }
@@ -85,32 +76,21 @@ fn study_against_itself_passes() {
 #[test]
 fn a_lower_patient_is_farther_from_the_arm() {
     let bench = bench();
-    let found = compare(&bench, &["--json"]).exits_with(0).json();
+    let found = compare(&bench, "--json").exits_with(0).json();
     has_keys(
         &found,
-        &[
-            "schema_version",
-            "pass",
-            "failures",
-            "a",
-            "b",
-            "paired",
-            "unpaired_because",
-            "changes",
-            "thresholds",
-        ],
+        "schema_version pass failures a b paired unpaired_because changes thresholds",
     );
     assert_eq!(found["unpaired_because"], Value::Null);
     let clearance = found["paired"]["differences"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
         .find(|each| each["of"] == "best" && each["metric"] == "clearance_static_mm")
         .unwrap();
-    let mean = clearance["mean"].as_f64().unwrap();
+    let mean = clearance["mean"].number();
     assert!(mean.abs() > 0.1 && mean.abs() < 8.1, "{mean}");
-    let text = compare(&bench, &[]).exits_with(0).stdout;
-    assert!(text.contains("B less A") && text.contains("PASS"), "{text}");
+    let text = compare(&bench, "").exits_with(0).stdout;
+    holds(&text, ["B less A", "PASS"]);
     assert!(
         text.lines()
             .skip_while(|line| !line.contains('─'))
@@ -123,55 +103,33 @@ fn a_lower_patient_is_farther_from_the_arm() {
 #[test]
 fn loss_beyond_its_threshold_exits_with_1_and_is_written_for_ci() {
     let bench = bench();
-    let more = [
-        "--max-loss",
-        "clearance@5=0.1mm",
-        "--junit",
-        "j.xml",
-        "--markdown",
-        "m.md",
-    ];
+    let more = "--max-loss clearance@5=0.1mm --junit j.xml --markdown m.md";
     // One of the two ways is a loss.
-    let there = bench.run(&[&["compare", "a", "lower"][..], &more].concat());
-    let back = bench.run(&[&["compare", "lower", "a"][..], &more].concat());
+    let there = bench.run(format!("compare a lower {more}"));
+    let back = bench.run(format!("compare lower a {more}"));
     let lost = if there.status == Some(1) {
         "a"
     } else {
         "lower"
     };
     let kept = if lost == "a" { &back } else { &there };
-    assert!(
-        kept.stdout.contains("allowed clearance@5 = 0.1mm"),
-        "{kept:#?}"
-    );
+    kept.says(["allowed clearance@5 = 0.1mm"]);
     let second = if lost == "a" { "lower" } else { "a" };
     let answer = bench
-        .run(&[&["compare", lost, second][..], &more].concat())
+        .run(format!("compare {lost} {second} {more}"))
         .exits_with(1);
-    assert!(
-        answer.stdout.contains("FAILED 5 % quantile of clearance"),
-        "{answer:#?}"
-    );
-    let junit = String::from_utf8(bench.read("j.xml")).unwrap();
-    assert!(
-        junit.contains("compare.thresholds") && junit.contains("<failure"),
-        "{junit}"
-    );
-    let markdown = String::from_utf8(bench.read("m.md")).unwrap();
-    assert!(
-        markdown.contains("**fail**") && markdown.contains("- **lost** 5 %"),
-        "{markdown}"
-    );
+    answer.says(["FAILED 5 % quantile of clearance"]);
+    let junit = bench.text("j.xml");
+    holds(&junit, ["compare.thresholds", "<failure"]);
+    let markdown = bench.text("m.md");
+    holds(&markdown, ["**fail**", "- **lost** 5 %"]);
 }
 
 #[test]
 fn other_points_are_compared_by_their_intervals() {
     let bench = bench();
-    let answer = bench.run(&["compare", "a", "other.parquet"]).exits_with(0);
-    assert!(
-        answer.stdout.contains("not the same cases (case 0"),
-        "{answer:#?}"
-    );
+    let answer = bench.run("compare a other.parquet").exits_with(0);
+    answer.says(["not the same cases (case 0"]);
 }
 
 #[test]
@@ -181,9 +139,9 @@ fn thresholds_of_studies_come_from_a_file_too() {
         "limits.toml",
         "[max_loss]\n\"clearance@5:every\" = \"1m\"\n",
     );
-    compare(&bench, &["--thresholds", "limits.toml"]).exits_with(0);
+    compare(&bench, "--thresholds limits.toml").exits_with(0);
     bench.write("limits.toml", "[max_loss]\nclearence = \"1mm\"\n");
-    compare(&bench, &["--thresholds", "limits.toml"])
+    compare(&bench, "--thresholds limits.toml")
         .exits_with(2)
         .complains(["limits.toml:2", "`clearence`", "did you mean `clearance`?"]);
 }
@@ -199,38 +157,36 @@ fn what_cannot_be_compared_is_refused_with_a_hint() {
             ["`Right-Up-Fld`", "did you mean `Right-Up-Fold`?"],
         ),
     ] {
-        compare(&bench, &["--max-loss", limit])
+        compare(&bench, format!("--max-loss {limit}"))
             .exits_with(2)
             .complains(parts);
     }
-    compare(&bench, &["--goal", "a=b"])
+    compare(&bench, "--goal a=b")
         .exits_with(2)
         .complains(["--goal", "hint"]);
     bench.write("s.toml", SMALL);
     bench
-        .run(&["compare", "a", "s.toml"])
+        .run("compare a s.toml")
         .exits_with(2)
         .complains(["--case", "a run is compared with one of the study's"]);
     let table = &tables()[0];
     bench.write("half.parquet", &table[..table.len() / 2]);
     bench
-        .run(&["compare", "a", "half.parquet"])
+        .run("compare a half.parquet")
         .exits_with(2)
         .complains(["half.parquet", "cut off", "hint"]);
     std::fs::create_dir(bench.path("unfinished")).unwrap();
     bench.write("unfinished/study.json", "{}");
-    bench
-        .run(&["compare", "a", "unfinished"])
-        .exits_with(2)
-        .complains(["unfinished", "not complete", "--resume"]);
+    bench.run("compare a unfinished").exits_with(2).complains([
+        "unfinished",
+        "not complete",
+        "--resume",
+    ]);
 }
 
 #[test]
 fn help_lists_every_rate_of_studies() {
-    let help = Bench::new()
-        .run(&["compare", "--help"])
-        .exits_with(0)
-        .stdout;
+    let help = Bench::new().run("compare --help").exits_with(0).stdout;
     for rate in needlebench_study::compare::STUDY_RATES {
         assert!(help.contains(rate.name), "{} is not in\n{help}", rate.name);
     }

@@ -2,23 +2,11 @@
 
 use std::fs;
 
-use crate::support::{Bench, has_keys, numbers, workspace};
+use crate::support::{Bench, Json, has_keys, holds, numbers, workspace};
 
 /// A chest of coarse pixels, with markers, lesions and a robot: about a tenth of a hospital's.
-const SCAN: [&str; 12] = [
-    "ct",
-    "synth",
-    "s.toml",
-    "--out",
-    "ct",
-    "--markers",
-    "ct-sphere",
-    "--pixels",
-    "224",
-    "--preset",
-    "thick-overlap",
-    "--no-labels",
-];
+const SCAN: &str =
+    "ct synth s.toml --out ct --markers ct-sphere --pixels 224 --preset thick-overlap --no-labels";
 
 fn suite() -> String {
     fs::read_to_string(workspace().join("scenarios/supine_suite.toml")).unwrap()
@@ -37,44 +25,27 @@ const LESION: &str = "nodule=-107,10,35";
 #[test]
 fn a_scan_becomes_a_patient_that_can_be_run() {
     let bench = scanned();
-    let arguments = [
-        "ct",
-        "build",
-        "ct/ct.nii.gz",
-        "--out",
-        "patient",
-        "--lesion",
-        LESION,
-        "--thickness-mm",
-        "5",
-        "--markers",
-        "ct/marker_list.toml",
-        "--room",
-        "s.toml",
-        "--json",
-    ];
-    let made = bench.run(&arguments).exits_with(0).json();
-    has_keys(
-        &made,
-        &["schema_version", "ok", "folder", "scenario", "report"],
+    let arguments = format!(
+        "ct build ct/ct.nii.gz --out patient --lesion {LESION} --thickness-mm 5 --markers ct/marker_list.toml --room s.toml --json"
     );
+    let made = bench.run(&arguments).exits_with(0).json();
+    has_keys(&made, "schema_version ok folder scenario report");
     let report = bench.read_json("patient/report.json");
     assert_eq!(made["report"], report);
     let truth = bench.read_json("ct/truth.json");
 
     // Every surface is there; the check below reads them.
     let names: Vec<&str> = report["surfaces"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
-        .map(|each| each["name"].as_str().unwrap())
+        .map(|each| each["name"].word())
         .collect();
     for name in ["skin", "lung_left", "lung_right", "bone", "nodule"] {
         assert!(names.contains(&name), "{names:?}");
     }
     // The middle of the lesion, against the phantom's.
     let seen = numbers(&report["targets"][0]["center_m"]);
-    let lesions = truth["lesions"].as_array().unwrap();
+    let lesions = truth["lesions"].list();
     let real = lesions
         .iter()
         .find(|each| each["name"] == "pleural_based")
@@ -83,14 +54,14 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
         assert!((seen - real).abs() < 0.3e-3, "{seen} {real}");
     }
     // All markers, each the right one, and the robot's place to what touching them leaves.
-    let registered = report["registration"]["markers"].as_array().unwrap();
+    let registered = report["registration"]["markers"].list();
     assert_eq!(registered.len(), 8);
-    let found = report["markers"]["found"].as_array().unwrap();
+    let found = report["markers"]["found"].list();
     for marker in registered {
         let place = numbers(
             &found[usize::try_from(marker["detected"].as_u64().unwrap()).unwrap()]["center_m"],
         );
-        let markers = truth["markers"].as_array().unwrap();
+        let markers = truth["markers"].list();
         let real = markers
             .iter()
             .find(|each| each["name"] == marker["name"])
@@ -100,13 +71,8 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
         }
     }
     let target = &report["targets"][0]["registration"];
-    let rms_m = target["rms_m"].as_f64().unwrap();
-    let matrix: Vec<Vec<f64>> = truth["robot_from_ct"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(numbers)
-        .collect();
+    let rms_m = target["rms_m"].number();
+    let matrix: Vec<Vec<f64>> = truth["robot_from_ct"].list().iter().map(numbers).collect();
     let off: f64 = numbers(&target["at_m"])
         .iter()
         .enumerate()
@@ -118,9 +84,7 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
     assert!(off.sqrt() < 4.0 * rms_m, "{off} {rms_m}");
 
     // The scenario is taken as it is.
-    let checked = bench
-        .run(&["check", "patient/scenario.toml", "--json"])
-        .json();
+    let checked = bench.run("check patient/scenario.toml --json").json();
     let findings = checked.to_string();
     assert!(!findings.contains("phantom.parts"), "{findings}");
     // Pictures are left out with --json; the words say where the errors come from.
@@ -128,14 +92,15 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
         .run(&arguments[..arguments.len() - 1])
         .exits_with(0)
         .stdout;
-    for part in [
-        "FRE",
-        "does not tell the error at the target",
-        "TRE",
-        "needlebench check",
-    ] {
-        assert!(words.contains(part), "{part}: {words}");
-    }
+    holds(
+        &words,
+        [
+            "FRE",
+            "does not tell the error at the target",
+            "TRE",
+            "needlebench check",
+        ],
+    );
 }
 
 #[test]
@@ -149,40 +114,17 @@ fn a_run_begins_with_a_scan_and_is_measured_against_the_true_lesion() {
     let (first, rest) = text.split_once("# Second intercostal space").unwrap();
     let (_, rest) = rest.split_once("[planning]").unwrap();
     let bench = Bench::with_scenario(&format!("{first}[planning]{rest}"));
-    let arguments = [
-        "run",
-        "s.toml",
-        "--engine",
-        "rapier",
-        "--no-page",
-        "--no-pictures",
-        "--quiet",
-        "--json",
-    ];
+    let arguments = "run s.toml --engine rapier --no-page --no-pictures --quiet --json";
     let report = bench.run(&arguments).exits_with(0).json();
     assert_eq!(report["verdict"], "pass");
     let criteria = report["criteria"].to_string();
     assert!(criteria.contains("max_true_target_error_mm"), "{criteria}");
     // What was planned for is what was found, not what is there.
-    let scenario = String::from_utf8(bench.read("out/ct_chest/ct/scenario.toml")).unwrap();
-    assert!(
-        scenario.contains("true_target_mm") && scenario.contains("[[phantom.parts]]"),
-        "{scenario}"
-    );
+    let scenario = bench.text("out/ct_chest/ct/scenario.toml");
+    holds(&scenario, ["true_target_mm", "[[phantom.parts]]"]);
     assert!(!scenario.contains("[ct]"), "{scenario}");
     // It can be run again as it is, and gives the same.
-    let again = bench.run(&[
-        "run",
-        "out/ct_chest/ct/scenario.toml",
-        "--engine",
-        "rapier",
-        "--no-page",
-        "--no-pictures",
-        "--quiet",
-        "--json",
-        "--out",
-        "again",
-    ]);
+    let again = bench.run("run out/ct_chest/ct/scenario.toml --engine rapier --no-page --no-pictures --quiet --json --out again");
     let again = again.exits_with(0).json();
     assert_eq!(again["criteria"], report["criteria"]);
 }

@@ -2,43 +2,16 @@
 
 use std::fs;
 
-use crate::support::{Bench, has_keys, numbers, workspace};
+use crate::support::{Bench, Json, has_keys, holds, numbers, workspace};
 
 /// A chest of coarse pixels with markers that the robot has touched, and the patient made of it.
 fn built() -> Bench {
     let text = fs::read_to_string(workspace().join("scenarios/supine_suite.toml")).unwrap();
     let bench = Bench::with_scenario(&text);
-    let scan = [
-        "ct",
-        "synth",
-        "s.toml",
-        "--out",
-        "ct",
-        "--markers",
-        "ct-sphere",
-        "--pixels",
-        "300",
-        "--preset",
-        "biopsy",
-        "--no-labels",
-    ];
+    let scan =
+        "ct synth s.toml --out ct --markers ct-sphere --pixels 300 --preset biopsy --no-labels";
     bench.run(&scan).exits_with(0);
-    let build = [
-        "ct",
-        "build",
-        "ct/ct.nii.gz",
-        "--out",
-        "patient",
-        "--lesion",
-        "nodule=-107,10,35",
-        "--thickness-mm",
-        "2.5",
-        "--markers",
-        "ct/marker_list.toml",
-        "--room",
-        "s.toml",
-        "--no-pictures",
-    ];
+    let build = "ct build ct/ct.nii.gz --out patient --lesion nodule=-107,10,35 --thickness-mm 2.5 --markers ct/marker_list.toml --room s.toml --no-pictures";
     bench.run(&build).exits_with(0);
     bench
 }
@@ -46,28 +19,9 @@ fn built() -> Bench {
 #[test]
 fn routes_in_a_scan_are_planned_with_the_robot_written_and_checked() {
     let bench = built();
-    let arguments = [
-        "ct",
-        "routes",
-        "patient",
-        "--directions",
-        "3000",
-        "--write",
-        "patient/planned.toml",
-        "--json",
-    ];
+    let arguments = "ct routes patient --directions 3000 --write patient/planned.toml --json";
     let found = bench.run(&arguments).exits_with(0).json();
-    has_keys(
-        &found,
-        &[
-            "schema_version",
-            "ok",
-            "findings",
-            "targets",
-            "remarks",
-            "written",
-        ],
-    );
+    has_keys(&found, "schema_version ok findings targets remarks written");
     let target = &found["targets"][0];
     assert_eq!(target["goal"], "nodule");
     assert_eq!(target["anatomy"], "voxels");
@@ -78,24 +32,21 @@ fn routes_in_a_scan_are_planned_with_the_robot_written_and_checked() {
     let working = route["working"].as_u64().unwrap();
     assert!(working >= target["wanted"].as_u64().unwrap());
     // Margins hold with the error of every configuration that works.
-    let sigmas = target["sigmas"].as_f64().unwrap();
-    let constant_m = target["margin_constant_m"].as_f64().unwrap();
-    for each in route["configurations"].as_array().unwrap() {
+    let sigmas = target["sigmas"].number();
+    let constant_m = target["margin_constant_m"].number();
+    for each in route["configurations"].list() {
         if each["works"] != true {
             assert!(each["reason"].is_string(), "{each}");
             continue;
         }
         let error = &each["error"];
-        let (bias_m, sd_m) = (
-            error["bias_m"].as_f64().unwrap(),
-            error["sd_m"].as_f64().unwrap(),
-        );
-        let spare_m = each["spare_m"].as_f64().unwrap();
+        let (bias_m, sd_m) = (error["bias_m"].number(), error["sd_m"].number());
+        let spare_m = each["spare_m"].number();
         let mut least_m = f64::INFINITY;
-        for margin in route["margins"].as_array().unwrap() {
+        for margin in route["margins"].list() {
             if let Some(distance_m) = margin["distance_m"].as_f64() {
                 let wanted_m =
-                    (constant_m + bias_m + sigmas * sd_m).max(margin["margin_m"].as_f64().unwrap());
+                    (constant_m + bias_m + sigmas * sd_m).max(margin["margin_m"].number());
                 least_m = least_m.min(distance_m - wanted_m);
             }
         }
@@ -103,19 +54,16 @@ fn routes_in_a_scan_are_planned_with_the_robot_written_and_checked() {
         assert!(spare_m >= 0.0);
     }
     // The terms make the sum.
-    let terms = route["risk"]["terms"].as_array().unwrap();
-    let sum: f64 = terms
-        .iter()
-        .map(|term| term["log_odds"].as_f64().unwrap())
-        .sum();
-    assert!((libm::exp(sum) - route["risk"]["odds_ratio"].as_f64().unwrap()).abs() < 1e-9);
+    let terms = route["risk"]["terms"].list();
+    let sum: f64 = terms.iter().map(|term| term["log_odds"].number()).sum();
+    assert!((libm::exp(sum) - route["risk"]["odds_ratio"].number()).abs() < 1e-9);
     // The file has every direction with its rule and value.
     let file = bench.read_json("patient/routes.json");
     let map = &file["targets"][0]["map"];
-    let rules = map["rule"].as_array().unwrap();
+    let rules = map["rule"].list();
     assert_eq!(rules.len(), 3000);
-    let values = map["value"].as_array().unwrap();
-    let odds = map["odds_ratio"].as_array().unwrap();
+    let values = map["value"].list();
+    let odds = map["odds_ratio"].list();
     let known = rules
         .iter()
         .zip(values)
@@ -129,23 +77,12 @@ fn routes_in_a_scan_are_planned_with_the_robot_written_and_checked() {
     );
     // The entry is on the skin of the patient that is run: the scenario says how deep the needle goes.
     let checked = bench
-        .run(&["check", "patient/planned.toml", "--json"])
+        .run("check patient/planned.toml --json")
         .exits_with(0)
         .json();
     assert_eq!(checked["ok"], true);
     // The same on another number of threads.
-    let alone = [
-        "ct",
-        "routes",
-        "patient",
-        "--directions",
-        "3000",
-        "--json",
-        "--jobs",
-        "1",
-        "--out",
-        "other",
-    ];
+    let alone = "ct routes patient --directions 3000 --json --jobs 1 --out other";
     let again = bench.run(&alone).exits_with(0).json();
     assert_eq!(again["targets"], found["targets"]);
     let entry = numbers(&route["entry_in_phantom_m"]);
@@ -155,56 +92,30 @@ fn routes_in_a_scan_are_planned_with_the_robot_written_and_checked() {
 #[test]
 fn what_cannot_be_planned_is_said() {
     let bench = built();
-    let fails = |arguments: &[&str], words: &str| {
-        let all = [&["ct", "routes"], arguments].concat();
+    let fails = |arguments: &str, words: &str| {
+        let all = format!("ct routes {arguments}");
         let text = bench.run(&all).exits_with(2).stderr;
         let flat: Vec<&str> = text.split_whitespace().collect();
         assert!(flat.join(" ").contains(words), "{text}");
     };
-    fails(&["patient", "--target", "0,0,900"], "outside");
-    fails(&["patient", "--lesion", "no_such"], "no_such");
-    fails(&["nowhere"], "nowhere");
-    fails(&["ct"], "ct build");
-    fails(
-        &["patient", "--write", "elsewhere.toml"],
-        "beside the scenario",
-    );
+    fails("patient --target 0,0,900", "outside");
+    fails("patient --lesion no_such", "no_such");
+    fails("nowhere", "nowhere");
+    fails("ct", "ct build");
+    fails("patient --write elsewhere.toml", "beside the scenario");
     // Without markers nobody knows where the robot is: routes by the patient alone, and why.
-    let build = [
-        "ct",
-        "build",
-        "ct/ct.nii.gz",
-        "--out",
-        "unregistered",
-        "--lesion",
-        "nodule=-107,10,35",
-        "--thickness-mm",
-        "2.5",
-        "--room",
-        "s.toml",
-        "--no-pictures",
-    ];
+    let build = "ct build ct/ct.nii.gz --out unregistered --lesion nodule=-107,10,35 --thickness-mm 2.5 --room s.toml --no-pictures";
     bench.run(&build).exits_with(0);
-    let arguments = [
-        "ct",
-        "routes",
-        "unregistered",
-        "--directions",
-        "1000",
-        "--json",
-    ];
+    let arguments = "ct routes unregistered --directions 1000 --json";
     let found = bench.run(&arguments).exits_with(0).json();
-    let why = found["targets"][0]["robot_not_asked"].as_str().unwrap();
-    assert!(
-        why.contains("markers") && why.contains("--assume-room"),
-        "{why}"
-    );
+    let why = found["targets"][0]["robot_not_asked"].word();
+    holds(&why, ["markers", "--assume-room"]);
     assert_eq!(
         found["targets"][0]["routes"][0]["configurations"],
         serde_json::json!([])
     );
     fs::remove_file(bench.path("patient/labels.nii.gz")).unwrap();
-    fails(&["patient"], "--no-labels");
+    fails("patient", "--no-labels");
 }
 
 #[test]
@@ -222,30 +133,24 @@ fn a_goal_with_a_route_has_its_entry_planned() {
         &text[rest..]
     );
     let bench = Bench::with_scenario(&planned);
-    let checked = bench.run(&["check", "s.toml"]).exits_with(0);
+    let checked = bench.run("check s.toml").exits_with(0);
     let words: Vec<&str> = checked.stdout.split_whitespace().collect();
     let said = format!("{} {}", words.join(" "), checked.stderr);
-    assert!(
-        said.contains("route planned for goal `right_pleural_lateral`"),
-        "{said}"
-    );
+    holds(&said, ["route planned for goal `right_pleural_lateral`"]);
     // Not both.
     let both = planned.replace(
         "[goals.route]",
         "entry_mm = [-156.4, 16.8, 15.2]\n[goals.route]",
     );
     let text = Bench::with_scenario(&both)
-        .run(&["check", "s.toml"])
+        .run("check s.toml")
         .exits_with(2)
         .stderr;
-    assert!(
-        text.contains("has an entry and a route to be planned"),
-        "{text}"
-    );
+    holds(&text, ["has an entry and a route to be planned"]);
     // Rules that nothing keeps.
     let hard = planned.replace("sigmas = 1", "margin_mm = 40");
     let text = Bench::with_scenario(&hard)
-        .run(&["check", "s.toml"])
+        .run("check s.toml")
         .exits_with(2)
         .stderr;
     assert!(text.contains("has no route"), "{text}");

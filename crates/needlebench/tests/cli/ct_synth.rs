@@ -4,25 +4,14 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::support::{Bench, has_keys, numbers, workspace};
+use crate::support::{Answer, Bench, Json, has_keys, numbers, workspace};
 
 /// Coarse enough to take no time.
-const COARSE: [&str; 8] = [
-    "--pixels",
-    "96",
-    "--pixel-mm",
-    "3.6",
-    "--preset",
-    "thick",
-    "--increment-mm",
-    "20",
-];
+const COARSE: &str = "--pixels 96 --pixel-mm 3.6 --preset thick --increment-mm 20";
 
-fn synth<'a>(subject: &'a str, more: &[&'a str]) -> Vec<&'a str> {
-    let mut arguments = vec!["ct", "synth", subject, "--out", "ct"];
-    arguments.extend(COARSE);
-    arguments.extend(more);
-    arguments
+fn synth(bench: &Bench, subject: &str, out: &str, more: &str) -> Answer {
+    let answer = bench.run(format!("ct synth '{subject}' --out {out} {COARSE} {more}"));
+    answer.exits_with(0)
 }
 
 fn suite() -> String {
@@ -30,29 +19,18 @@ fn suite() -> String {
 }
 
 fn matrix(value: &Value) -> Vec<Vec<f64>> {
-    value.as_array().unwrap().iter().map(numbers).collect()
+    value.list().iter().map(numbers).collect()
 }
 
 #[test]
 fn a_scenario_gives_a_volume_labels_and_a_truth_that_names_the_robot() {
     let bench = Bench::with_scenario(&suite());
-    let arguments = synth(
-        "s.toml",
-        &["--json", "--markers", "ct-sphere", "--format", "both"],
-    );
-    let made = bench.run(&arguments).exits_with(0).json();
-    has_keys(&made, &["schema_version", "folder", "files", "truth"]);
+    let more = "--json --markers ct-sphere --format both";
+    let made = synth(&bench, "s.toml", "ct", more).json();
+    has_keys(&made, "schema_version folder files truth");
     let truth = bench.read_json("ct/truth.json");
     assert_eq!(made["truth"], truth);
-    let keys = [
-        "scanner",
-        "materials_hu",
-        "seed",
-        "ct_from_index",
-        "robot_from_ct",
-        "lesions",
-        "markers",
-    ];
+    let keys = "scanner materials_hu seed ct_from_index robot_from_ct lesions markers";
     has_keys(&truth, &keys);
     let size = numbers(&truth["size"]);
     assert_eq!(size[..2], [96.0, 96.0]);
@@ -65,8 +43,7 @@ fn a_scenario_gives_a_volume_labels_and_a_truth_that_names_the_robot() {
     let names = bench.read_json("ct/labels.json");
     let named = |name: &str| {
         names["labels"]
-            .as_array()
-            .unwrap()
+            .list()
             .iter()
             .any(|label| label["name"] == name)
     };
@@ -99,9 +76,7 @@ fn a_scenario_gives_a_volume_labels_and_a_truth_that_names_the_robot() {
 fn the_same_call_gives_the_same_bytes_on_any_number_of_threads() {
     let bench = Bench::new();
     for (out, jobs) in [("one", "1"), ("two", "3")] {
-        let mut arguments = synth("male-p50-supine", &["--jobs", jobs]);
-        arguments[4] = out;
-        bench.run(&arguments).exits_with(0);
+        synth(&bench, "male-p50-supine", out, &format!("--jobs {jobs}"));
     }
     for name in ["ct.nii.gz", "labels.nii.gz", "truth.json", "labels.json"] {
         assert_eq!(
@@ -117,13 +92,7 @@ fn the_same_call_gives_the_same_bytes_on_any_number_of_threads() {
 fn a_file_of_sizes_is_scanned_and_markers_that_ct_cannot_see_are_said_to_be() {
     let bench = Bench::new();
     let file = workspace().join("models/chest_phantom/female-p5.toml");
-    let answer = bench
-        .run(&synth(file.to_str().unwrap(), &["--no-labels"]))
-        .exits_with(0);
-    assert!(
-        answer.stdout.contains("--markers ct-sphere"),
-        "{}",
-        answer.stdout
-    );
+    let answer = synth(&bench, file.to_str().unwrap(), "ct", "--no-labels");
+    answer.says(["--markers ct-sphere"]);
     assert!(!bench.path("ct/labels.nii.gz").exists());
 }

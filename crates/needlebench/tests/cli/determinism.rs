@@ -6,7 +6,7 @@ use crate::support::{Bench, SMALL, mujoco_is_ready, with_edit, without_times};
 
 /// The text of a report without its only part that may differ.
 fn without_timings(bench: &Bench, folder: &str) -> String {
-    let text = String::from_utf8(bench.read(&format!("{folder}/small/report.json"))).unwrap();
+    let text = bench.text(&format!("{folder}/small/report.json"));
     let timings = text.find("  \"timings\": {").unwrap();
     let end = timings + text[timings..].find('}').unwrap() + 1;
     format!("{}{}", &text[..timings], &text[end..])
@@ -18,7 +18,7 @@ fn repeated_runs_write_identical_files_apart_from_the_timings() {
     let text = with_edit(SMALL, "pictures = false", "pictures = true");
     let bench = Bench::with_scenario(&text);
     for (folder, jobs) in [("a", "1"), ("b", "2"), ("c", "2")] {
-        let answer = bench.run(&["run", "s.toml", "--out", folder, "--jobs", jobs]);
+        let answer = bench.run(format!("run s.toml --out {folder} --jobs {jobs}"));
         answer.exits_with(0);
     }
     let files = bench.tree("a");
@@ -48,7 +48,7 @@ fn repeated_runs_write_identical_files_apart_from_the_timings() {
 #[test]
 fn printed_report_is_the_written_one() {
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["run", "s.toml", "--engine", "rapier", "--json"]);
+    let answer = bench.run("run s.toml --engine rapier --json");
     let printed: Value = answer.exits_with(0).json();
     assert_eq!(printed, bench.read_json("out/small/report.json"));
 }

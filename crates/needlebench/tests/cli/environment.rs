@@ -7,13 +7,13 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use crate::process::{LongRun, is_alive, signal};
-use crate::support::{Answer, Bench, SMALL, with_edit};
+use crate::support::{Answer, Bench, Json, SMALL, with_edit};
 
 /// The report has all of rapier's results, of MuJoCo's at most those from before its failure, and
 /// says why; gives MuJoCo's failure.
 #[track_caller]
 fn rapier_is_kept(report: &Value) -> Value {
-    let configurations = report["goals"][0]["configurations"].as_array().unwrap();
+    let configurations = report["goals"][0]["configurations"].list();
     let by = |engine: &str| {
         let measured = |each: &&Value| each["engines"][engine]["tip_position_error_m"].is_number();
         configurations.iter().filter(measured).count()
@@ -24,7 +24,7 @@ fn rapier_is_kept(report: &Value) -> Value {
         let both = each["engines"]["mujoco"].is_object();
         assert_eq!(each["engine_difference"].is_object(), both);
     }
-    let failures = report["engine_failures"].as_array().unwrap();
+    let failures = report["engine_failures"].list();
     assert_eq!(failures.len(), 1, "{failures:#?}");
     assert_eq!(failures[0]["engine"], "mujoco");
     failures[0].clone()
@@ -32,7 +32,7 @@ fn rapier_is_kept(report: &Value) -> Value {
 
 #[track_caller]
 fn failure_says<const N: usize>(failure: &Value, parts: [&str; N]) {
-    let message = failure["message"].as_str().unwrap();
+    let message = failure["message"].word();
     for part in parts {
         assert!(message.contains(part), "no `{part}` in\n{message}");
     }
@@ -42,7 +42,7 @@ fn failure_says<const N: usize>(failure: &Value, parts: [&str; N]) {
 #[track_caller]
 fn failing_run(text: &str, variables: &[(&str, Option<&str>)]) -> (Value, Answer) {
     let bench = Bench::with_scenario(text);
-    let answer = bench.run_with(variables, &["run", "s.toml", "--engine", "both"]);
+    let answer = bench.run_with(variables, "run s.toml --engine both");
     let answer = answer.exits_with(3);
     let report = bench.read_json("out/small/report.json");
     (rapier_is_kept(&report), answer)
@@ -59,13 +59,13 @@ fn stand_in(command: &str) -> Value {
 fn what_an_engine_did_not_measure_is_incomplete_wherever_a_verdict_stands() {
     let bench = Bench::with_scenario(SMALL);
     let broken = [("NEEDLEBENCH_HARNESS_COMMAND", Some("sh -c \"exit 7\""))];
-    let both = ["run", "s.toml", "--engine", "both", "--out"];
-    let whole = bench.run(&[&both[..], &["whole"]].concat()).exits_with(0);
-    let partial = [&both[..], &["part", "--junit", "part.xml"]].concat();
+    let both = "run s.toml --engine both --out";
+    let whole = bench.run(format!("{both} whole")).exits_with(0);
+    let partial = format!("{both} part --junit part.xml");
     let partial = bench.run_with(&broken, &partial).exits_with(3);
     let [whole_report, report] =
         ["whole", "part"].map(|folder| bench.read_json(&format!("{folder}/small/report.json")));
-    let count = |report: &Value, key: &str| report[key].as_array().unwrap().len();
+    let count = |report: &Value, key: &str| report[key].list().len();
     let total = count(&whole_report, "criteria");
     let judged = count(&report, "criteria");
     assert_eq!(
@@ -86,40 +86,33 @@ fn what_an_engine_did_not_measure_is_incomplete_wherever_a_verdict_stands() {
     let begin =
         format!("INCOMPLETE small: {judged} of {total} criteria judged, all met; not judged: ");
     assert!(first(&partial.stdout).starts_with(&begin), "{partial:#?}");
-    let markdown = String::from_utf8(bench.read("part/small/summary.md")).unwrap();
+    let markdown = bench.text("part/small/summary.md");
     assert!(
         markdown.starts_with("# small: **incomplete**\n"),
         "{markdown}"
     );
-    let junit = String::from_utf8(bench.read("part.xml")).unwrap();
+    let junit = bench.text("part.xml");
     assert!(junit.contains("errors=\"8\""), "{junit}"); // six configurations, the goal, the engine
     assert!(junit.contains("not judged: "), "{junit}");
 
     // Compared with a whole run metrics are lost, which needs to be allowed by name.
-    let compared = bench
-        .run(&["compare", "whole/small", "part/small"])
-        .exits_with(1);
+    let compared = bench.run("compare whole/small part/small").exits_with(1);
     assert!(
         first(&compared.stdout).starts_with("FAIL: "),
         "{compared:#?}"
     );
-    assert!(
-        compared.stdout.contains("no longer measured: "),
-        "{compared:#?}"
-    );
+    compared.says(["no longer measured: "]);
     for [a, b] in [["whole", "part"], ["part", "whole"], ["part", "part"]] {
         let [a, b] = [a, b].map(|folder| format!("{folder}/small"));
         let compared = bench
-            .run(&["compare", "--allow-lost", &a, &b])
+            .run(format!("compare --allow-lost {a} {b}"))
             .exits_with(1);
         assert!(
             first(&compared.stdout).starts_with("INCOMPLETE: "),
             "{compared:#?}"
         );
     }
-    let same = bench
-        .run(&["compare", "whole/small", "whole/small"])
-        .exits_with(0);
+    let same = bench.run("compare whole/small whole/small").exits_with(0);
     assert!(first(&same.stdout).starts_with("PASS: "), "{same:#?}");
 }
 
@@ -167,9 +160,9 @@ fn cache_folder_that_cannot_be_written_is_named() {
 #[test]
 fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
     let bench = Bench::new();
-    let fetched = bench.run(&["doctor", "--download", "wheels", "--json"]);
+    let fetched = bench.run("doctor --download wheels --json");
     let fetched = fetched.exits_with(0).json();
-    assert_eq!(fetched["files"].as_array().unwrap().len(), 2, "{fetched}");
+    assert_eq!(fetched["files"].list().len(), 2, "{fetched}");
 
     // Nobody answers there.
     let nowhere = "http://127.0.0.1:9";
@@ -192,9 +185,9 @@ fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
     let path = std::env::var("PATH").unwrap();
     let path = format!("{}:{path}", bench.path("bin").display());
     let with_uv = [&offline[..], &[("PATH", Some(path.as_str()))]].concat();
-    let prepare = ["doctor", "--prepare", "--wheels", "wheels", "--json"];
+    let prepare = "doctor --prepare --wheels wheels --json";
     let refused = bench
-        .run_with(&with_uv, &["doctor", "--prepare"])
+        .run_with(&with_uv, "doctor --prepare")
         .exits_with(3);
     refused.complains([
         "uv failed, trying pip instead",
@@ -209,14 +202,14 @@ fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
 
     let ready = bench.run_with(&offline, &prepare).exits_with(0).json();
     assert_eq!(ready["made"], true);
-    let folder = ready["folder"].as_str().unwrap();
+    let folder = ready["folder"].word();
     assert!(folder.starts_with(&cache), "{ready}");
     // MuJoCo and numpy, unpacked.
     let size = ready["size_bytes"].as_u64().unwrap();
     assert!((50_000_000..200_000_000).contains(&size), "{size}");
-    let again = bench.run_with(&offline, &["doctor", "--prepare", "--json"]);
+    let again = bench.run_with(&offline, "doctor --prepare --json");
     assert_eq!(again.exits_with(0).json()["made"], false);
-    bench.run_with(&offline, &["doctor"]).exits_with(0);
+    bench.run_with(&offline, "doctor").exits_with(0);
 
     // A wheel that was cut off or changed on its way.
     std::fs::remove_dir_all(&cache).unwrap();
@@ -242,7 +235,7 @@ fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
 fn doctor_exits_with_3_and_the_same_advice() {
     let bench = Bench::new();
     let variables = [("NEEDLEBENCH_PYTHON", Some("/nonexistent/python"))];
-    let answer = bench.run_with(&variables, &["doctor", "--json"]);
+    let answer = bench.run_with(&variables, "doctor --json");
     let answer = answer.exits_with(3).json();
     assert_eq!(answer["ok"], false);
     let text = answer["checks"].to_string();
@@ -296,7 +289,7 @@ fn harness_that_is_killed_in_mid_run_loses_its_own_results_only() {
     assert_eq!(run.end().code(), Some(3));
     let failure = rapier_is_kept(&run.bench.read_json("out/small/report.json"));
     failure_says(&failure, ["the MuJoCo harness died", "signal: 9"]);
-    let during = failure["during"].as_str().unwrap();
+    let during = failure["during"].word();
     assert!(during.starts_with("pose "), "{during}");
 }
 

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::support::{Bench, SMALL, has_keys, mujoco_is_ready, with_edit};
+use crate::support::{Bench, Json, SMALL, has_keys, mujoco_is_ready, with_edit};
 
 /// Contacts as in `scenarios/contact.toml`, a stop at its worst moment, and the way back.
 const EVENTS: &str = r#"
@@ -42,7 +42,7 @@ fn scenario(from: &str, to: &str) -> String {
 fn run(text: &str) -> Value {
     mujoco_is_ready();
     let bench = Bench::with_scenario(text);
-    bench.run(&["run", "s.toml", "--json"]).exits_with(0).json()
+    bench.run("run s.toml --json").exits_with(0).json()
 }
 
 fn report() -> &'static Value {
@@ -52,7 +52,7 @@ fn report() -> &'static Value {
 
 /// Events of the configurations that have any.
 fn events(report: &Value) -> Vec<&Value> {
-    let configurations = report["goals"][0]["configurations"].as_array().unwrap();
+    let configurations = report["goals"][0]["configurations"].list();
     let found: Vec<&Value> = configurations
         .iter()
         .filter_map(|each| each.get("events"))
@@ -80,7 +80,7 @@ fn contacts_of_the_tool_agree_between_engines_and_with_the_joints_torques() {
         assert_eq!(press["class"], "robot_table");
         // One configuration meets the table with its upper arm, a lever of centimetres: 1 mm asks for
         // more than a kilonewton there.
-        if !press["solids"][0].as_str().unwrap().starts_with("tool") {
+        if !press["solids"][0].word().starts_with("tool") {
             continue;
         }
         seen += 1;
@@ -95,7 +95,7 @@ fn contacts_of_the_tool_agree_between_engines_and_with_the_joints_torques() {
         for engine in engines(press) {
             assert!(number(&engine["settled_force_n"]) > 1.0, "{press:#}");
             // No reader of the file alone takes it for a force on a patient.
-            let means = press["force_means"].as_str().unwrap();
+            let means = press["force_means"].word();
             assert!(means.contains("rigid") && means.contains("not the force on a patient"));
             assert!(
                 number(&engine["balance_difference"]) < FORCE_SHARE,
@@ -104,21 +104,7 @@ fn contacts_of_the_tool_agree_between_engines_and_with_the_joints_torques() {
             let first = &engine["episodes"][0];
             has_keys(
                 first,
-                &[
-                    "start_s",
-                    "end_s",
-                    "phase",
-                    "pair",
-                    "approach_speed_m_s",
-                    "peak_force_n",
-                    "settled_force_n",
-                    "impulse_ns",
-                    "deepest_penetration_m",
-                    "settled_penetration_m",
-                    "release_s",
-                    "tip_peak_after_m",
-                    "tip_recovery_s",
-                ],
+                "start_s end_s phase pair approach_speed_m_s peak_force_n settled_force_n impulse_ns deepest_penetration_m settled_penetration_m release_s tip_peak_after_m tip_recovery_s",
             );
             assert_eq!(first["phase"], "press");
             // The speed that is asked for by default, less what it takes to bring a curved guide there.
@@ -134,7 +120,7 @@ fn contacts_of_the_tool_agree_between_engines_and_with_the_joints_torques() {
 fn contact_that_cannot_be_had_says_why() {
     for events in events(report()) {
         let press = &events["press"][1];
-        let reason = press["not_staged"].as_str().unwrap();
+        let reason = press["not_staged"].word();
         assert!(reason.contains("would touch as well"), "{reason}");
         assert_eq!(press["force_difference"], Value::Null);
     }
@@ -142,7 +128,7 @@ fn contact_that_cannot_be_had_says_why() {
 
 #[test]
 fn limits_of_contacts_are_criteria_of_the_report() {
-    let criteria = report()["criteria"].as_array().unwrap();
+    let criteria = report()["criteria"].list();
     let key = "events.press[0].max_force_difference";
     assert!(criteria.iter().any(|each| each["criterion"] == key));
 }
@@ -157,7 +143,7 @@ fn stop_goes_as_far_as_predicted_and_is_certified() {
             (&brakes["arm"], &brakes["file"]),
             (&"UR3".into(), &"builtin:ur3/arm.toml".into())
         );
-        assert!(brakes["source"].as_str().unwrap().contains("appendix A.1"));
+        assert!(brakes["source"].word().contains("appendix A.1"));
         let predicted_m = number(&stop["envelope"]["worst_tip_distance_m"]);
         assert!(predicted_m > 1e-3);
         for engine in engines(stop) {
@@ -209,8 +195,8 @@ fn limit_that_is_missed_fails_the_run() {
     mujoco_is_ready();
     let strict = "category = 0\nmax_tip_distance_mm = 0.001";
     let bench = Bench::with_scenario(&scenario("category = 0", strict));
-    let answer = bench.run(&["run", "s.toml"]).exits_with(1);
-    assert!(answer.stdout.contains("events.stop.max_tip_distance_mm"));
-    let all = bench.run(&["run", "s.toml", "--wide"]).exits_with(1);
-    assert!(all.stdout.contains("emergency stop"));
+    let answer = bench.run("run s.toml").exits_with(1);
+    answer.says(["events.stop.max_tip_distance_mm"]);
+    let all = bench.run("run s.toml --wide").exits_with(1);
+    all.says(["emergency stop"]);
 }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Bench, SMALL, mujoco_is_ready, with_edit};
+use crate::support::{Bench, Json, SMALL, mujoco_is_ready, with_edit};
 
 /// Every block with its defaults, few samples; the criteria of a nominal robot do not hold.
 const BLOCKS: &str = "
@@ -47,20 +47,17 @@ fn engines_and_balance_of_torques_agree_on_where_an_imperfect_arm_ends() {
     mujoco_is_ready();
     let text = with_edit(&imperfect(BLOCKS), "hold_s = 0.1", "hold_s = 0.6");
     let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["run", "s.toml", "--out", "a", "--jobs", "1", "--wide"]);
-    assert!(
-        answer.stdout.contains("error budget of the needle's tip"),
-        "{answer:#?}"
-    );
+    let answer = bench.run("run s.toml --out a --jobs 1 --wide");
+    answer.says(["error budget of the needle's tip"]);
     let once = report(&bench, "a/small/report.json");
-    assert!(once["truth"]["flange_offset_m"][0].as_f64().unwrap() != 0.0);
-    let configurations = once["goals"][0]["configurations"].as_array().unwrap();
+    assert!(once["truth"]["flange_offset_m"][0].number() != 0.0);
+    let configurations = once["goals"][0]["configurations"].list();
     let mut simulated = 0;
     for each in configurations {
         for engine in each["engines"].as_object().unwrap().values() {
             simulated += 1;
-            let error_m = engine["tip_position_error_m"].as_f64().unwrap();
-            let unexplained_m = engine["unexplained_tip_m"].as_f64().unwrap();
+            let error_m = engine["tip_position_error_m"].number();
+            let unexplained_m = engine["unexplained_tip_m"].number();
             assert!(error_m > 0.1e-3, "an imperfect arm misses: {error_m}");
             assert!(unexplained_m < UNEXPLAINED_M, "{unexplained_m}");
         }
@@ -68,15 +65,12 @@ fn engines_and_balance_of_torques_agree_on_where_an_imperfect_arm_ends() {
             continue;
         }
         let total = &each["budget"]["total"]["at_target"];
-        assert!(
-            total["analytic"]["rms_m"].as_f64().unwrap() > 0.5e-3,
-            "{total}"
-        );
-        assert_eq!(each["budget"]["sources"].as_array().unwrap().len(), 13);
+        assert!(total["analytic"]["rms_m"].number() > 0.5e-3, "{total}");
+        assert_eq!(each["budget"]["sources"].list().len(), 13);
     }
     assert!(simulated > 0);
 
-    bench.run(&["run", "s.toml", "--out", "b", "--jobs", "2"]);
+    bench.run("run s.toml --out b --jobs 2");
     assert_eq!(
         once,
         report(&bench, "b/small/report.json"),
@@ -94,25 +88,23 @@ fn engines_and_balance_of_torques_agree_on_an_arm_under_another_gravity() {
     let text = with_edit(SMALL, "hold_s = 0.1", "hold_s = 1.0");
     let text = format!("{text}\n[controller]\ngravity_m_s2 = 9.82\n");
     let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["run", "s.toml", "--out", "a", "--wide"]);
-    for part in [
+    let answer = bench.run("run s.toml --out a --wide");
+    answer.says([
         "with the nominal arm under another gravity than its controller believes in",
         "note: the controller believes in a gravity of 9.82 m/s^2, where it is 9.80665 m/s^2",
-    ] {
-        assert!(answer.stdout.contains(part), "no `{part}` in {answer:#?}");
-    }
+    ]);
     let report = report(&bench, "a/small/report.json");
     let gravity = &report["gravity"];
     assert_eq!(gravity["world_m_s2"], 9.80665);
     assert_eq!(gravity["believed_m_s2"], 9.82);
     assert_eq!(gravity["believed_source"], "s.toml: controller");
-    let configurations = report["goals"][0]["configurations"].as_array().unwrap();
+    let configurations = report["goals"][0]["configurations"].list();
     let mut names = Vec::new();
     for each in configurations {
         for (name, engine) in each["engines"].as_object().unwrap() {
-            let error_m = engine["tip_position_error_m"].as_f64().unwrap();
-            let predicted_m = each["predicted"]["tip_position_error_m"].as_f64().unwrap();
-            let unexplained_m = engine["unexplained_tip_m"].as_f64().unwrap();
+            let error_m = engine["tip_position_error_m"].number();
+            let predicted_m = each["predicted"]["tip_position_error_m"].number();
+            let unexplained_m = engine["unexplained_tip_m"].number();
             println!("{name}: {error_m:e} {predicted_m:e} {unexplained_m:e}");
             assert!((1e-7..1e-4).contains(&error_m), "{error_m:e}");
             assert!((predicted_m - error_m).abs() < UNEXPLAINED_M);
@@ -130,21 +122,19 @@ fn unstable_gains_are_explained_before_anything_moves() {
         500_000.0
     );
     let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["run", "s.toml", "--engine", "rapier"]);
-    for part in [
+    let answer = bench.run("run s.toml --engine rapier");
+    answer.says([
         "the servo is unstable",
         "kp, kd, armature and time step",
         "stable below",
-    ] {
-        assert!(answer.stdout.contains(part), "no `{part}` in {answer:#?}");
-    }
+    ]);
     answer.exits_with(3);
 }
 
 #[test]
 fn the_small_scenario_is_sound_before_it_is_spoilt() {
     let bench = Bench::with_scenario(&with_edit(&imperfect(BLOCKS), "budget_samples = 200", ""));
-    bench.run(&["check", "s.toml"]).exits_with(0);
+    bench.run("check s.toml").exits_with(0);
 }
 
 /// Markers and target as a scan was found to show them.
@@ -182,11 +172,8 @@ fn with_lesion_at([x, y, z]: [f64; 3]) -> String {
 fn the_needle_is_measured_against_the_true_lesion() {
     // Where the target is planned to be is said where no lesion can be.
     let bench = Bench::with_scenario(&with_lesion_at([0.0, 900.0, 0.0]));
-    let answer = bench.run(&["check", "s.toml", "--json"]).exits_with(2);
-    let hint = answer.json()["findings"][0]["hint"]
-        .as_str()
-        .unwrap()
-        .to_owned();
+    let answer = bench.run("check s.toml --json").exits_with(2);
+    let hint = answer.json()["findings"][0]["hint"].word().to_owned();
     let (_, planned) = hint.rsplit_once('[').unwrap();
     let mut planned = planned.trim_end_matches(']').split(", ");
     let planned_mm: [f64; 3] = std::array::from_fn(|_| planned.next().unwrap().parse().unwrap());
@@ -194,15 +181,15 @@ fn the_needle_is_measured_against_the_true_lesion() {
     let [x, y, z] = planned_mm;
     let text = with_lesion_at([x, y, z + 4.0]);
     let bench = Bench::with_scenario(&format!("{text}{MEASURED}"));
-    let arguments = ["run", "s.toml", "--engine", "rapier", "--out", "a"];
+    let arguments = "run s.toml --engine rapier --out a";
     // Lines are broken where the terminal ends.
-    let said = |more: &[&str]| {
-        let answer = bench.run(&[&arguments[..], more].concat());
+    let said = |more: &str| {
+        let answer = bench.run(format!("{arguments} {more}"));
         let words: Vec<&str> = answer.stdout.split_whitespace().collect();
         words.join(" ")
     };
-    let screen = said(&[]);
-    let wide = said(&["--wide"]);
+    let screen = said("");
+    let wide = said("--wide");
     for (text, part) in [
         (&screen, "true lesion: tip "),
         (&screen, "mm across the needle"),
@@ -220,22 +207,22 @@ fn the_needle_is_measured_against_the_true_lesion() {
     let goal = &report["goals"][0];
     assert!(goal["true_target_m"].is_array());
     let mut simulated = 0;
-    for each in goal["configurations"].as_array().unwrap() {
+    for each in goal["configurations"].list() {
         let Some(engine) = each["engines"].get("rapier") else {
             continue;
         };
         simulated += 1;
-        let off_m = engine["true_target_error_m"].as_f64().unwrap();
+        let off_m = engine["true_target_error_m"].number();
         // To the rounding of the hint: draws of what is believed of the target do not count.
         assert!((off_m - 4e-3).abs() < 0.1e-3, "{off_m}");
-        assert!(engine["true_target_lateral_m"].as_f64().unwrap() <= off_m);
+        assert!(engine["true_target_lateral_m"].number() <= off_m);
         assert_eq!(each["metrics"]["true_target_error"].as_f64(), Some(off_m));
-        let sources = each["budget"]["sources"].as_array().unwrap();
+        let sources = each["budget"]["sources"].list();
         let bases: Vec<Option<&str>> = sources.iter().map(|each| each["basis"].as_str()).collect();
         assert_eq!(bases, [None, Some("measured"), Some("assumed")]);
     }
     assert!(simulated > 0);
-    let missed = report["criteria"].as_array().unwrap().iter();
+    let missed = report["criteria"].list().iter();
     let missed = missed.filter(|each| each["criterion"] == "max_true_target_error_mm");
     let missed: Vec<&Value> = missed.filter(|each| each["pass"] == false).collect();
     assert_eq!(missed.len(), simulated);
@@ -244,12 +231,10 @@ fn the_needle_is_measured_against_the_true_lesion() {
 #[test]
 fn goals_without_a_true_lesion_have_no_numbers_of_one() {
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&[
-        "run", "s.toml", "--engine", "rapier", "--out", "a", "--wide",
-    ]);
+    let answer = bench.run("run s.toml --engine rapier --out a --wide");
     assert!(!answer.stdout.contains("true lesion"), "{answer:#?}");
-    let text = String::from_utf8(bench.read("a/small/report.json")).unwrap();
+    let text = bench.text("a/small/report.json");
     assert!(!text.contains("true_target") && !text.contains("\"basis\""));
-    let summary = String::from_utf8(bench.read("a/small/summary.md")).unwrap();
+    let summary = bench.text("a/small/summary.md");
     assert!(!summary.contains("true lesion"));
 }

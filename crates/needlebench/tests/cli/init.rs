@@ -1,17 +1,17 @@
 //! `needlebench init`: every scenario that it writes passes, and says what it is.
 
-use crate::support::{Bench, mujoco_is_ready};
+use crate::support::{Bench, Json, holds, mujoco_is_ready};
 
 const ARMS: [&str; 3] = ["ur3", "ur3e", "ur5e"];
 const TEMPLATES: [&str; 3] = ["table", "hanging", "lateral"];
 
 /// Writes a variant, and asks `check` of it.
 #[track_caller]
-fn passes_check(bench: &Bench, template: &str, arm: &str, others: &[&str]) {
+fn passes_check(bench: &Bench, template: &str, arm: &str) {
     let file = format!("{template}_{arm}.toml");
-    let arguments = ["init", &file, "--force", "--from", template, "--arm", arm];
-    bench.run(&[&arguments[..], others].concat()).exits_with(0);
-    bench.run(&["check", &file]).exits_with(0);
+    let init = format!("init {file} --force --from {template} --arm {arm}");
+    bench.run(init).exits_with(0);
+    bench.run(format!("check {file}")).exits_with(0);
 }
 
 #[test]
@@ -19,7 +19,7 @@ fn every_template_with_every_arm_passes_check() {
     let bench = Bench::new();
     for template in TEMPLATES {
         for arm in ARMS {
-            passes_check(&bench, template, arm, &[]);
+            passes_check(&bench, template, arm);
         }
     }
 }
@@ -29,30 +29,16 @@ fn every_template_with_every_arm_passes_check() {
 #[ignore = "long: every template, arm, phantom and lesion"]
 fn every_variant_passes_check_or_is_refused() {
     let bench = Bench::new();
-    let choices = bench
-        .run(&["init", "--list", "--json"])
-        .exits_with(0)
-        .json();
+    let choices = bench.run("init --list --json").exits_with(0).json();
     let (mut written, mut refused) = (0, 0);
     for template in TEMPLATES {
         for arm in ARMS {
-            for phantom in choices["phantoms"].as_array().unwrap() {
-                for lesion in choices["lesions"].as_array().unwrap() {
-                    let [phantom, lesion] =
-                        [phantom, &lesion["name"]].map(|each| each.as_str().unwrap());
-                    let arguments = [
-                        "init",
-                        "v.toml",
-                        "--force",
-                        "--from",
-                        template,
-                        "--arm",
-                        arm,
-                        "--phantom",
-                        phantom,
-                        "--lesion",
-                        lesion,
-                    ];
+            for phantom in choices["phantoms"].list() {
+                for lesion in choices["lesions"].list() {
+                    let [phantom, lesion] = [phantom, &lesion["name"]].map(|each| each.word());
+                    let arguments = format!(
+                        "init v.toml --force --from {template} --arm {arm} --phantom {phantom} --lesion {lesion}"
+                    );
                     let answer = bench.run(&arguments);
                     if answer.status == Some(1) {
                         refused += 1;
@@ -60,7 +46,7 @@ fn every_variant_passes_check_or_is_refused() {
                         continue;
                     }
                     answer.exits_with(0);
-                    bench.run(&["check", "v.toml"]).exits_with(0);
+                    bench.run("check v.toml").exits_with(0);
                     written += 1;
                 }
             }
@@ -74,10 +60,10 @@ fn every_variant_passes_check_or_is_refused() {
 fn what_is_written_runs_in_both_engines() {
     mujoco_is_ready();
     let bench = Bench::new();
-    let said = bench.run(&["init"]).exits_with(0).stdout;
+    let said = bench.run("init").exits_with(0).stdout;
     assert!(said.contains("needlebench run first.toml"), "{said}");
     bench
-        .run(&["run", "first.toml", "--no-pictures", "--no-page"])
+        .run("run first.toml --no-pictures --no-page")
         .exits_with(0);
 }
 
@@ -87,25 +73,18 @@ fn other_templates_run_too() {
     for (template, arm) in [("hanging", "ur3"), ("lateral", "ur3e"), ("table", "ur5e")] {
         let file = format!("{template}.toml");
         bench
-            .run(&["init", &file, "--from", template, "--arm", arm])
+            .run(format!("init {file} --from {template} --arm {arm}"))
             .exits_with(0);
-        let run = [
-            "run",
-            &file,
-            "--engine",
-            "rapier",
-            "--no-pictures",
-            "--no-page",
-        ];
-        bench.run(&run).exits_with(0);
+        let run = format!("run {file} --engine rapier --no-pictures --no-page");
+        bench.run(run).exits_with(0);
     }
 }
 
 #[test]
 fn the_text_says_its_schema_first_and_explains_every_value() {
     let bench = Bench::new();
-    bench.run(&["init", "mine.toml"]).exits_with(0);
-    let text = String::from_utf8(bench.read("mine.toml")).unwrap();
+    bench.run("init mine.toml").exits_with(0);
+    let text = bench.text("mine.toml");
     assert!(
         text.starts_with("#:schema ./scenario.schema.json\n"),
         "{text}"
@@ -133,22 +112,19 @@ fn files_are_not_replaced_unless_forced() {
     let bench = Bench::new();
     bench.write("first.toml", "mine");
     bench
-        .run(&["init"])
+        .run("init")
         .exits_with(2)
         .complains(["first.toml", "--force"]);
     assert_eq!(bench.read("first.toml"), b"mine");
-    bench.run(&["init", "--force"]).exits_with(0);
-    bench.run(&["init", "new_folder/"]).exits_with(0);
-    bench.run(&["check", "new_folder/first.toml"]).exits_with(0);
+    bench.run("init --force").exits_with(0);
+    bench.run("init new_folder/").exits_with(0);
+    bench.run("check new_folder/first.toml").exits_with(0);
 }
 
 #[test]
 fn a_small_study_comes_with_it_and_runs() {
     let bench = Bench::new();
-    let said = bench.run(&["init", "--study"]).exits_with(0).stdout;
-    assert!(
-        said.contains("needlebench study first_study.toml"),
-        "{said}"
-    );
-    bench.run(&["study", "first_study.toml"]).exits_with(0);
+    let said = bench.run("init --study").exits_with(0).stdout;
+    holds(&said, ["needlebench study first_study.toml"]);
+    bench.run("study first_study.toml").exits_with(0);
 }

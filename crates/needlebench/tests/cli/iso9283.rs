@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde_json::Value;
 
-use crate::support::{Bench, files, mujoco_is_ready, without_times, workspace};
+use crate::support::{Bench, Json, files, mujoco_is_ready, without_times, workspace};
 
 /// A test that takes a second: fewer cycles than the standard asks for, rapier alone.
 const SMALL: &str = r#"
@@ -36,7 +36,7 @@ fn shipped_test_passes_in_both_engines() {
     assert!(files("scenarios", "toml").len() > 1);
     let bench = Bench::new();
     let report = bench
-        .run(&["run", scenario.to_str().unwrap(), "--json", "--quiet"])
+        .run(format!("run '{}' --json --quiet", scenario.display()))
         .exits_with(0)
         .json();
     assert_eq!(report["verdict"], "pass");
@@ -48,17 +48,12 @@ fn shipped_test_passes_in_both_engines() {
             found["cycles_simulated"], 2,
             "the nominal robot repeats itself"
         );
-        assert_eq!(found["poses"].as_array().unwrap().len(), 5);
-        assert_eq!(found["directional"].as_array().unwrap().len(), 3);
+        assert_eq!(found["poses"].list().len(), 5);
+        assert_eq!(found["directional"].list().len(), 3);
         // The tracker's noise alone: 30 draws of sigma 5 um give l' + 3 S of 13 to 22 um.
-        let rp_m = found["rp_m"].as_f64().unwrap();
+        let rp_m = found["rp_m"].number();
         assert!((1e-5..3e-5).contains(&rp_m), "{rp_m}");
-        assert!(
-            found["remark"]
-                .as_str()
-                .unwrap()
-                .contains("tracker's noise alone")
-        );
+        assert!(found["remark"].word().contains("tracker's noise alone"));
     }
     for name in [
         "commanded.csv",
@@ -82,26 +77,18 @@ fn shipped_test_passes_in_both_engines() {
 #[test]
 fn a_robot_without_anything_random_has_no_spread_and_says_so() {
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["run", "s.toml"]).exits_with(0);
-    assert!(
-        answer
-            .stdout
-            .contains("RP = 0 because nothing random is switched on")
-    );
-    assert!(
-        answer
-            .stdout
-            .contains("4 cycles instead of the standard's 30")
-    );
+    let answer = bench.run("run s.toml").exits_with(0);
+    answer.says(["RP = 0 because nothing random is switched on"]);
+    answer.says(["4 cycles instead of the standard's 30"]);
     let report = bench.read_json("out/small/report.json");
     let found = &report["iso9283"]["engines"]["rapier"];
     assert_eq!(found["nothing_random"], true);
     assert_eq!(found["rp_m"], 0.0);
     // What servo and rounding leave.
-    assert!(found["ap_m"].as_f64().unwrap() < 1e-9);
-    for each in found["stabilisation"].as_array().unwrap() {
+    assert!(found["ap_m"].number() < 1e-9);
+    for each in found["stabilisation"].list() {
         assert_eq!(each["overshoot_m"], 0.0);
-        assert!(each["after_motion_s"].as_f64().unwrap() < 0.0, "{each}");
+        assert!(each["after_motion_s"].number() < 0.0, "{each}");
     }
 }
 
@@ -116,7 +103,7 @@ fn an_imperfect_robot_misses_its_poses_and_scatters() {
     );
     let bench = Bench::with_scenario(&text);
     let measured = |out: &str| {
-        let arguments = ["run", "s.toml", "--no-pictures", "--quiet", "--out", out];
+        let arguments = format!("run s.toml --no-pictures --quiet --out {out}");
         bench.run(&arguments).exits_with(0);
         bench.read_json(&format!("{out}/small/report.json"))["iso9283"]["engines"]["rapier"].clone()
     };
@@ -127,7 +114,7 @@ fn an_imperfect_robot_misses_its_poses_and_scatters() {
         (&false.into(), &Value::Null)
     );
     // Six real arms are off by 0.9 to 1.7 mm at the flange on average; drawn ones spread further.
-    let value = |key: &str| found[key].as_f64().unwrap();
+    let value = |key: &str| found[key].number();
     assert!((1e-4..1e-2).contains(&value("ap_m")), "{found}");
     assert!((1e-7..1e-4).contains(&value("rp_m")), "{found}");
     // Friction holds the joints where they were pushed from.
@@ -139,18 +126,10 @@ fn an_imperfect_robot_misses_its_poses_and_scatters() {
 #[test]
 fn the_log_of_a_run_is_analysed_to_the_same_numbers() {
     let bench = Bench::with_scenario(&with_keys("tracker_noise_um = 20"));
-    bench.run(&["run", "s.toml", "--no-pictures"]).exits_with(0);
+    bench.run("run s.toml --no-pictures").exits_with(0);
     let report = bench.read_json("out/small/report.json");
-    let arguments = [
-        "iso9283",
-        "--csv",
-        "out/small/attained.rapier.csv",
-        "--commanded",
-        "out/small/commanded.csv",
-        "--json",
-        "--out",
-        "again",
-    ];
+    let arguments = "iso9283 --csv out/small/attained.rapier.csv --commanded out/small/commanded.csv \
+                     --json --out again";
     let answer = bench.run(&arguments).exits_with(0).json();
     let simulated = &report["iso9283"]["engines"]["rapier"];
     for key in [
@@ -166,7 +145,7 @@ fn the_log_of_a_run_is_analysed_to_the_same_numbers() {
     }
     // And once more, from what the analysis wrote.
     let comments_apart = |name: &str| {
-        let text = String::from_utf8(bench.read(name)).unwrap();
+        let text = bench.text(name);
         let lines = text.lines().filter(|line| !line.starts_with('#'));
         lines.map(str::to_owned).collect::<Vec<_>>()
     };
@@ -183,7 +162,7 @@ fn the_log_of_a_run_is_analysed_to_the_same_numbers() {
 fn results_do_not_depend_on_the_number_of_threads() {
     let bench = Bench::with_scenario(&with_keys("tracker_noise_um = 20"));
     for jobs in ["1", "3"] {
-        let arguments = ["run", "s.toml", "--jobs", jobs, "--out", jobs, "--quiet"];
+        let arguments = format!("run s.toml --jobs {jobs} --out {jobs} --quiet");
         bench.run(&arguments).exits_with(0);
     }
     let without_timings = |name: &str| {
@@ -216,37 +195,17 @@ fn a_limit_that_is_missed_fails_the_run() {
         with_keys("tracker_noise_um = 20\napproach_mm = 0")
     );
     let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["run", "s.toml", "--no-pictures"]).exits_with(1);
-    assert!(
-        answer
-            .stdout
-            .contains("FAILED iso9283 Right-Up-Fold rapier max_repeatability_mm:")
-    );
-    let junit = String::from_utf8(bench.read("out/small/junit.xml")).unwrap();
+    let answer = bench.run("run s.toml --no-pictures").exits_with(1);
+    answer.says(["FAILED iso9283 Right-Up-Fold rapier max_repeatability_mm:"]);
+    let junit = bench.text("out/small/junit.xml");
     assert!(junit.contains("max_repeatability_mm (rapier)"), "{junit}");
-    let arguments = [
-        "iso9283",
-        "--csv",
-        "out/small/attained.rapier.csv",
-        "--commanded",
-        "out/small/commanded.csv",
-        "--max-rp",
-        "0.001",
-    ];
-    let answer = bench.run(&arguments).exits_with(1);
-    assert!(
-        answer.stdout.contains("FAILED max_rp:"),
-        "{}",
-        answer.stdout
-    );
-    let mut arguments = arguments;
-    arguments[5] = "--max-vap";
-    let answer = bench.run(&arguments).exits_with(1);
-    assert!(
-        answer.stdout.contains("max_vap: not measured"),
-        "{}",
-        answer.stdout
-    );
+    let analyse = "iso9283 --csv out/small/attained.rapier.csv --commanded out/small/commanded.csv";
+    let answer = bench.run(format!("{analyse} --max-rp 0.001")).exits_with(1);
+    answer.says(["FAILED max_rp:"]);
+    let answer = bench
+        .run(format!("{analyse} --max-vap 0.001"))
+        .exits_with(1);
+    answer.says(["max_vap: not measured"]);
 }
 
 #[test]
@@ -266,21 +225,14 @@ fn a_tracker_in_its_own_frame_is_told_how_to_go_on() {
         }
     }
     bench.write("log.csv", log);
-    let plain = [
-        "iso9283",
-        "--csv",
-        "log.csv",
-        "--commanded",
-        "commanded.csv",
-    ];
+    let plain = "iso9283 --csv log.csv --commanded commanded.csv";
     let answer = bench.run(&plain).exits_with(0);
-    assert!(answer.stdout.contains("--fit-frame"), "{}", answer.stdout);
-    let mut fitted: Vec<&str> = plain.to_vec();
-    fitted.extend(["--fit-frame", "--json"]);
-    let report = bench.run(&fitted).exits_with(0).json();
+    answer.says(["--fit-frame"]);
+    let fitted = bench.run(format!("{plain} --fit-frame --json"));
+    let report = fitted.exits_with(0).json();
     // Measured exactly but for the shift, which the fit takes away.
-    assert!(report["ap_m"].as_f64().unwrap() < 1e-12, "{report}");
-    let rp_m = report["rp_m"].as_f64().unwrap();
+    assert!(report["ap_m"].number() < 1e-12, "{report}");
+    let rp_m = report["rp_m"].number();
     // Distances 10, 0, 10 um: l' = 20/3 um, S = sqrt(100/3) um.
     assert!((rp_m - 1e-6 * (20.0 / 3.0 + 3.0 * (100.0_f64 / 3.0).sqrt())).abs() < 1e-12);
     assert_eq!(report["frame_fit"]["poses"], 4);

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use serde_json::Value;
 
-use crate::support::{Bench, SMALL, TABLE_3_POSE, has_keys, numbers};
+use crate::support::{Bench, Json, SMALL, TABLE_3_POSE, has_keys, numbers};
 
 /// The paper's Table 3 under its true labels, rad, wrapped to (-pi, pi].
 const TABLE_3: [(&str, [f64; 6]); 8] = [
@@ -59,7 +59,7 @@ fn angle_difference(a: f64, b: f64) -> f64 {
 }
 
 fn solutions(answer: &Value) -> &Vec<Value> {
-    answer["solutions"].as_array().unwrap()
+    answer["solutions"].list()
 }
 
 fn comma_separated(numbers: &[f64]) -> String {
@@ -70,34 +70,23 @@ fn comma_separated(numbers: &[f64]) -> String {
 #[test]
 fn pose_of_table_3_has_its_eight_solutions_under_their_labels() {
     let bench = Bench::new();
-    let answer = bench.run(&["ik", "--pose", TABLE_3_POSE, "--json"]);
+    let answer = bench.run(format!("ik --pose {TABLE_3_POSE} --json"));
     let answer = answer.exits_with(0).json();
-    has_keys(
-        &answer,
-        &["schema_version", "solutions", "count", "certificate"],
-    );
+    has_keys(&answer, "schema_version solutions count certificate");
     assert_eq!(answer["count"], 8);
     assert_eq!(answer["certificate"], "complete");
     assert_eq!(solutions(&answer).len(), 8);
     for (solution, (label, row)) in solutions(&answer).iter().zip(TABLE_3) {
         has_keys(
             solution,
-            &[
-                "label",
-                "joints_rad",
-                "residual_m",
-                "residual_rad",
-                "within_limits",
-                "free_joint",
-                "kind",
-            ],
+            "label joints_rad residual_m residual_rad within_limits free_joint kind",
         );
         assert_eq!(solution["label"], label);
         assert_eq!(solution["kind"], "exact");
         assert_eq!(solution["within_limits"], true);
         assert_eq!(solution["free_joint"], Value::Null);
-        assert!(solution["residual_m"].as_f64().unwrap() <= RESIDUAL);
-        assert!(solution["residual_rad"].as_f64().unwrap() <= RESIDUAL);
+        assert!(solution["residual_m"].number() <= RESIDUAL);
+        assert!(solution["residual_rad"].number() <= RESIDUAL);
         let joints = numbers(&solution["joints_rad"]);
         for (joint, expected) in joints.iter().zip(row) {
             assert!(angle_difference(*joint, expected) < TABLE_3_RAD, "{label}");
@@ -108,14 +97,14 @@ fn pose_of_table_3_has_its_eight_solutions_under_their_labels() {
 #[test]
 fn forward_kinematics_undo_inverse_kinematics() {
     let bench = Bench::new();
-    let answer = bench.run(&["ik", "--pose", TABLE_3_POSE, "--json"]).json();
+    let answer = bench.run(format!("ik --pose {TABLE_3_POSE} --json")).json();
     let pose: Vec<f64> = TABLE_3_POSE
         .split(',')
         .map(|word| word.parse().unwrap())
         .collect();
     for solution in solutions(&answer) {
         let joints = comma_separated(&numbers(&solution["joints_rad"]));
-        let found = bench.run(&["fk", "--joints", &joints, "--json"]);
+        let found = bench.run(format!("fk --joints {joints} --json"));
         let found = &found.exits_with(0).json()["flange_in_base"];
         let position = numbers(&found["position_m"]);
         let rotation = numbers(&found["rotvec_rad"]);
@@ -128,16 +117,11 @@ fn forward_kinematics_undo_inverse_kinematics() {
 #[test]
 fn forward_kinematics_answer_in_both_base_frames_and_for_every_link() {
     let bench = Bench::new();
-    let answer = bench.run(&["fk", "--joints", "0,0,0,0,0,0", "--json"]);
+    let answer = bench.run("fk --joints 0,0,0,0,0,0 --json");
     let answer = answer.exits_with(0).json();
     has_keys(
         &answer,
-        &[
-            "schema_version",
-            "flange_in_base",
-            "flange_in_base_link",
-            "links",
-        ],
+        "schema_version flange_in_base flange_in_base_link links",
     );
     // `base_link` is `base` turned by half a turn about z.
     let in_base = numbers(&answer["flange_in_base"]["position_m"]);
@@ -150,7 +134,7 @@ fn forward_kinematics_answer_in_both_base_frames_and_for_every_link() {
     let links = answer["links"].as_object().unwrap();
     assert_eq!(links.len(), 6);
     for pose in links.values() {
-        has_keys(pose, &["position_m", "rotvec_rad", "quat_wxyz"]);
+        has_keys(pose, "position_m rotvec_rad quat_wxyz");
         let norm: f64 = numbers(&pose["quat_wxyz"]).iter().map(|q| q * q).sum();
         assert!((norm - 1.0).abs() < ROUND_TRIP);
     }
@@ -159,9 +143,9 @@ fn forward_kinematics_answer_in_both_base_frames_and_for_every_link() {
 #[test]
 fn goal_of_a_scenario_is_solved_like_its_pose() {
     let bench = Bench::with_scenario(SMALL);
-    let by_goal = bench.run(&["ik", "s.toml", "--goal", "pose", "--json"]);
+    let by_goal = bench.run("ik s.toml --goal pose --json");
     let by_goal = by_goal.exits_with(0).json();
-    let by_pose = bench.run(&["ik", "--pose", TABLE_3_POSE, "--json"]).json();
+    let by_pose = bench.run(format!("ik --pose {TABLE_3_POSE} --json")).json();
     assert_eq!(solutions(&by_goal).len(), 8);
     for (goal, pose) in solutions(&by_goal).iter().zip(solutions(&by_pose)) {
         assert_eq!(goal["label"], pose["label"]);
@@ -175,34 +159,34 @@ fn goal_of_a_scenario_is_solved_like_its_pose() {
 #[test]
 fn unreachable_pose_says_how_much_is_missing() {
     let bench = Bench::new();
-    let answer = bench.run(&["ik", "--pose", "0.9,0,0.1,0,0,0", "--json"]);
+    let answer = bench.run("ik --pose 0.9,0,0.1,0,0,0 --json");
     let answer = answer.exits_with(0).json();
     assert_eq!(answer["count"], 0);
     assert!(solutions(&answer).is_empty());
     assert_eq!(answer["certificate"], "nearest_only");
-    let unreachable = answer["unreachable"].as_array().unwrap();
+    let unreachable = answer["unreachable"].list();
     assert_eq!(unreachable.len(), 8);
     assert!(
         unreachable
             .iter()
-            .all(|each| each["missing_m"].as_f64().unwrap() > 0.2)
+            .all(|each| each["missing_m"].number() > 0.2)
     );
     // Apart from the solutions, and named for what they are.
-    let nearest = answer["nearest"].as_array().unwrap();
+    let nearest = answer["nearest"].list();
     assert!(!nearest.is_empty());
     for row in nearest {
         assert_eq!(row["kind"], "nearest");
-        assert!(row["residual_m"].as_f64().unwrap() > 0.2);
+        assert!(row["residual_m"].number() > 0.2);
     }
 }
 
 #[test]
 fn free_wrist_is_named_and_certified_as_such() {
     let bench = Bench::new();
-    let pose = bench.run(&["fk", "--joints", "0.3,-1.2,1.4,-0.5,0,0.8", "--json"]);
+    let pose = bench.run("fk --joints 0.3,-1.2,1.4,-0.5,0,0.8 --json");
     let pose = &pose.json()["flange_in_base"];
     let numbers = [numbers(&pose["position_m"]), numbers(&pose["rotvec_rad"])].concat();
-    let answer = bench.run(&["ik", "--pose", &comma_separated(&numbers), "--json"]);
+    let answer = bench.run(format!("ik --pose {} --json", comma_separated(&numbers)));
     let answer = answer.exits_with(0).json();
     assert_eq!(answer["certificate"], "free_joint");
     let free = solutions(&answer)
@@ -220,18 +204,14 @@ const PRINTED_MATRIX: &str = "[[-0.8421 -0.4673  0.2693  0.1942]
 #[test]
 fn rounded_matrix_is_refused_with_a_pose_that_is_accepted() {
     let bench = Bench::new();
-    let refused = bench.run(&["ik", "--matrix", PRINTED_MATRIX]).exits_with(2);
+    let refused = bench
+        .run(format!("ik --matrix '{PRINTED_MATRIX}'"))
+        .exits_with(2);
     let offered = refused.stderr.split("--pose ").nth(1).unwrap();
     let offered = offered.split(';').next().unwrap();
-    let by_pose = bench.run(&["ik", "--pose", offered, "--json"]);
+    let by_pose = bench.run(format!("ik --pose {offered} --json"));
     let by_pose = by_pose.exits_with(0).json();
-    let by_matrix = [
-        "ik",
-        "--matrix",
-        PRINTED_MATRIX,
-        "--nearest-rotation",
-        "--json",
-    ];
+    let by_matrix = format!("ik --matrix '{PRINTED_MATRIX}' --nearest-rotation --json");
     let by_matrix = bench.run(&by_matrix).exits_with(0).json();
     assert_eq!(solutions(&by_pose).len(), 8);
     for (pose, matrix) in solutions(&by_pose).iter().zip(solutions(&by_matrix)) {
@@ -257,19 +237,9 @@ fn rounded_matrix_is_refused_with_a_pose_that_is_accepted() {
 fn exact_matrix_is_solved_like_its_vector() {
     let bench = Bench::new();
     // Half a turn about x.
-    let by_matrix = [
-        "ik",
-        "--matrix",
-        "1,0,0,0.3, 0,-1,0,0.2, 0,0,-1,0.1",
-        "--json",
-    ];
+    let by_matrix = "ik --matrix '1,0,0,0.3, 0,-1,0,0.2, 0,0,-1,0.1' --json";
     let by_matrix = bench.run(&by_matrix).exits_with(0).json();
-    let by_pose = [
-        "ik",
-        "--pose",
-        "0.3,0.2,0.1,3.141592653589793,0,0",
-        "--json",
-    ];
+    let by_pose = "ik --pose 0.3,0.2,0.1,3.141592653589793,0,0 --json";
     let by_pose = bench.run(&by_pose).exits_with(0).json();
     assert!(by_matrix["count"].as_u64().unwrap() >= 2);
     assert_eq!(by_matrix["count"], by_pose["count"]);
@@ -286,7 +256,7 @@ fn every_arm_inverts_its_own_forward_kinematics() {
     let bench = Bench::new();
     let posture = "0.4,-1.3,1.5,-0.9,1.1,0.2";
     for arm in ["UR3", "UR3e", "UR5", "UR5e", "UR10", "UR10e", "UR16e"] {
-        let pose = bench.run(&["fk", "--arm", arm, "--joints", posture, "--json"]);
+        let pose = bench.run(format!("fk --arm {arm} --joints {posture} --json"));
         let pose = pose.exits_with(0).json();
         assert_eq!(pose["arm"], arm);
         assert_eq!(pose["calibration"], Value::Null);
@@ -294,8 +264,8 @@ fn every_arm_inverts_its_own_forward_kinematics() {
         let pose = [numbers(&pose["position_m"]), numbers(&pose["rotvec_rad"])].concat();
         let pose = comma_separated(&pose);
         let arm_in_lower_case = arm.to_lowercase();
-        let answer = ["ik", "--arm", &arm_in_lower_case, "--pose", &pose, "--json"];
-        let answer = bench.run(&answer).exits_with(0).json();
+        let answer = bench.run(format!("ik --arm {arm_in_lower_case} --pose {pose} --json"));
+        let answer = answer.exits_with(0).json();
         assert_eq!(answer["arm"], arm);
         let wanted: Vec<f64> = posture.split(',').map(|q| q.parse().unwrap()).collect();
         let found = solutions(&answer).iter().any(|solution| {
@@ -311,16 +281,9 @@ fn every_arm_inverts_its_own_forward_kinematics() {
 fn iteration_limit_is_kept_and_its_row_is_no_solution() {
     let bench = Bench::new();
     let run = |method: &str, limit: &str| {
-        bench.run(&[
-            "ik",
-            "--pose",
-            TABLE_3_POSE,
-            "--method",
-            method,
-            "--max-iterations",
-            limit,
-            "--json",
-        ])
+        bench.run(format!(
+            "ik --pose {TABLE_3_POSE} --method {method} --max-iterations {limit} --json"
+        ))
     };
     let answer = run("gauss-newton", "1").exits_with(0).json();
     assert_eq!(answer["count"], 0);
@@ -332,7 +295,7 @@ fn iteration_limit_is_kept_and_its_row_is_no_solution() {
 #[test]
 fn whole_turns_stay_within_the_limits_and_keep_the_residual() {
     let bench = Bench::new();
-    let answer = bench.run(&["ik", "--pose", TABLE_3_POSE, "--wraps", "--json"]);
+    let answer = bench.run(format!("ik --pose {TABLE_3_POSE} --wraps --json"));
     let answer = answer.exits_with(0).json();
     // Five joints have two full turns of range, the elbow one.
     assert_eq!(answer["count"], 8 * 32);
@@ -356,20 +319,13 @@ fn gauss_newton_finds_the_solution_next_to_its_seed() {
     let bench = Bench::new();
     for (label, row) in TABLE_3 {
         let seed = comma_separated(&row.map(|joint| joint + 0.05));
-        let answer = bench.run(&[
-            "ik",
-            "--pose",
-            TABLE_3_POSE,
-            "--method",
-            "gauss-newton",
-            "--seed",
-            &seed,
-            "--json",
-        ]);
+        let answer = bench.run(format!(
+            "ik --pose {TABLE_3_POSE} --method gauss-newton --seed {seed} --json"
+        ));
         let answer = answer.exits_with(0).json();
         let solution = &solutions(&answer)[0];
         assert_eq!(solution["label"], label);
         assert_eq!(solution["kind"], "exact");
-        assert!(solution["residual_m"].as_f64().unwrap() <= RESIDUAL);
+        assert!(solution["residual_m"].number() <= RESIDUAL);
     }
 }

@@ -2,7 +2,7 @@
 
 use needlebench_evaluation::metric::MetricKey;
 
-use crate::support::{Bench, SMALL};
+use crate::support::{Bench, Json, SMALL};
 
 const IMPERFECT: &str = "
 [engines]
@@ -30,17 +30,15 @@ fn a_case_and_its_run_have_the_same_number_under_the_same_name() {
     let bench = Bench::with_scenario(&format!("{SMALL}{IMPERFECT}"));
     for (mode, fewest_shared) in [("static", 1), ("planned", 28), ("dynamic", 55)] {
         bench.write("study.toml", study(mode));
-        let case = ["study", "study.toml", "--case", "1", "--quiet"];
-        let rows = bench.run(&[&case[..], &["--json"]].concat());
+        let case = "study study.toml --case 1 --quiet";
+        let rows = bench.run(format!("{case} --json"));
         let rows = rows.exits_with(0).json();
-        let status = bench
-            .run(&[&case[..], &["--run", "--no-page"]].concat())
-            .status;
+        let status = bench.run(format!("{case} --run --no-page")).status;
         // The nominal pose is missed by more than a millimetre.
         assert!(matches!(status, Some(0 | 1)), "{status:?}");
         let report = bench.read_json(&format!("out/{mode}/cases/1/report.json"));
-        let configurations = report["goals"][0]["configurations"].as_array().unwrap();
-        for (row, configuration) in rows["rows"].as_array().unwrap().iter().zip(configurations) {
+        let configurations = report["goals"][0]["configurations"].list();
+        for (row, configuration) in rows["rows"].list().iter().zip(configurations) {
             assert_eq!(row["configuration"], configuration["label"]);
             let mut shared = 0;
             for (column, value) in row["metrics"].as_object().unwrap() {
@@ -56,7 +54,7 @@ fn a_case_and_its_run_have_the_same_number_under_the_same_name() {
                 #[expect(clippy::cast_possible_truncation, reason = "as columns are")]
                 let bits = |value: f64| (value as f32).to_bits();
                 assert_eq!(
-                    bits(value.as_f64().unwrap()),
+                    bits(value.number()),
                     bits(of_run / key.metric().unit.si),
                     "{mode} {} {column}",
                     row["configuration"]
@@ -75,11 +73,11 @@ fn a_case_and_its_run_have_the_same_number_under_the_same_name() {
 fn a_name_that_static_studies_lack_is_answered_by_their_own_and_said() {
     let bench = Bench::with_scenario(SMALL);
     bench.write("study.toml", study("static"));
-    let arguments = ["study", "study.toml", "--quiet", "--no-page"];
+    let arguments = "study study.toml --quiet --no-page";
     bench.run(&arguments).exits_with(0);
     let compare = |limit: &str| {
         let study = "out/static";
-        bench.run(&["compare", study, study, "--max-loss", limit])
+        bench.run(format!("compare {study} {study} --max-loss {limit}"))
     };
     let answer = compare("clearance@5=1mm").exits_with(0).stdout;
     let note = "note: threshold clearance@5: `clearance` was not measured: compared by \
@@ -97,31 +95,31 @@ fn a_case_of_a_study_is_compared_with_its_run() {
     let bench = Bench::with_scenario(&format!("{SMALL}{IMPERFECT}"));
     bench.write("study.toml", study("dynamic"));
     bench
-        .run(&["study", "study.toml", "--quiet", "--no-page"])
+        .run("study study.toml --quiet --no-page")
         .exits_with(0);
-    let run = ["study", "study.toml", "--case", "1", "--run", "--quiet"];
-    bench.run(&[&run[..], &["--no-page"]].concat());
-    let compare = ["compare", "out/dynamic/cases/1", "out/dynamic"];
-    let with = |more: &[&str]| bench.run(&[&compare[..], more].concat());
-    let same = with(&["--case", "1", "--max-loss", "tip_error=1nm", "--json"]);
+    let run = "study study.toml --case 1 --run --quiet";
+    bench.run(format!("{run} --no-page"));
+    let compare = "compare out/dynamic/cases/1 out/dynamic";
+    let with = |more: &str| bench.run(format!("{compare} {more}"));
+    let same = with("--case 1 --max-loss tip_error=1nm --json");
     let same = same.exits_with(0).json();
     assert_eq!(same["provenance_differences"].to_string(), "[]");
     let mut compared = 0;
-    for each in same["goals"][0]["configurations"].as_array().unwrap() {
+    for each in same["goals"][0]["configurations"].list() {
         assert_eq!(each["status"], "same", "{each}");
-        for metric in each["metrics"].as_array().unwrap() {
+        for metric in each["metrics"].list() {
             assert_eq!(metric["outcome"], "same", "{metric}");
             compared += 1;
         }
     }
     assert!(compared > 6 * 40, "{compared}");
     // Another place of the patient is another number.
-    let other = with(&["--case", "0", "--max-loss", "tip_error=1nm", "--json"]);
-    assert!(other.stdout.contains("\"worse\""), "{}", other.stdout);
-    with(&[])
+    let other = with("--case 0 --max-loss tip_error=1nm --json");
+    other.says(["\"worse\""]);
+    with("")
         .exits_with(2)
         .complains(["out/dynamic", "--case", "--case N"]);
-    with(&["--case", "2"])
+    with("--case 2")
         .exits_with(2)
         .complains(["no case 2", "cases 0 to 1"]);
 }

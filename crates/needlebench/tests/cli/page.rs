@@ -6,15 +6,13 @@ use crate::support::{Bench, SMALL, with_edit};
 const MOST_BYTES: usize = 3_000_000;
 
 fn page(bench: &Bench, name: &str) -> String {
-    String::from_utf8(bench.read(name)).unwrap()
+    bench.text(name)
 }
 
 #[test]
 fn a_run_leaves_one_small_file_that_needs_no_other() {
     let bench = Bench::with_scenario(SMALL);
-    bench
-        .run(&["run", "s.toml", "--engine", "rapier"])
-        .exits_with(0);
+    bench.run("run s.toml --engine rapier").exits_with(0);
     let html = page(&bench, "out/small/report.html");
     assert!(html.len() < MOST_BYTES, "{} bytes", html.len());
     assert!(html.contains("<title>run: small - needlebench</title>"));
@@ -34,10 +32,8 @@ fn texts_of_a_scenario_stay_texts() {
         &format!("name = \"small\"\n{attack}"),
     );
     let bench = Bench::with_scenario(&text);
-    bench
-        .run(&["run", "s.toml", "--engine", "rapier"])
-        .exits_with(0);
-    bench.run(&["atlas", "s.toml", "--rolls", "12", "--no-pictures"]);
+    bench.run("run s.toml --engine rapier").exits_with(0);
+    bench.run("atlas s.toml --rolls 12 --no-pictures");
     for name in ["out/small/report.html", "out/small/atlas.html"] {
         let html = page(&bench, name);
         assert!(html.contains("&lt;/script&gt;&lt;img src=x"), "{name}");
@@ -48,15 +44,15 @@ fn texts_of_a_scenario_stay_texts() {
 #[test]
 fn without_a_page_an_earlier_one_does_not_stay() {
     let bench = Bench::with_scenario(SMALL);
-    let arguments = ["run", "s.toml", "--engine", "rapier"];
+    let arguments = "run s.toml --engine rapier";
     bench.run(&arguments).exits_with(0);
     assert!(bench.path("out/small/report.html").exists());
-    let without = [&arguments[..], &["--no-page"]].concat();
+    let without = format!("{arguments} --no-page");
     bench.run(&without).exits_with(0);
     assert!(!bench.path("out/small/report.html").exists());
-    let atlas = ["atlas", "s.toml", "--rolls", "12", "--no-pictures"];
+    let atlas = "atlas s.toml --rolls 12 --no-pictures";
     bench.run(&atlas);
     assert!(bench.path("out/small/atlas.html").exists());
-    bench.run(&[&atlas[..], &["--no-page"]].concat());
+    bench.run(format!("{atlas} --no-page"));
     assert!(!bench.path("out/small/atlas.html").exists());
 }

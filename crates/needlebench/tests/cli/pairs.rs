@@ -2,14 +2,14 @@
 
 use serde_json::Value;
 
-use crate::support::{Answer, Bench, SMALL, has_keys};
+use crate::support::{Answer, Bench, Json, SMALL, has_keys};
 
 /// Postures enough to see a pair that collides at one in ten, and boxes enough to prove pairs
 /// with two joints between them.
-const QUICK: [&str; 4] = ["--samples", "200", "--proof-boxes", "5000"];
+const QUICK: &str = "--samples 200 --proof-boxes 5000";
 
-fn run(bench: &Bench, more: &[&str]) -> Answer {
-    bench.run(&[&["pairs", "s.toml"], &QUICK[..], more].concat())
+fn run(bench: &Bench, more: &str) -> Answer {
+    bench.run(format!("pairs s.toml {QUICK} {more}"))
 }
 
 const SRDF: &str = r#"<?xml version="1.0"?>
@@ -22,11 +22,10 @@ const SRDF: &str = r#"<?xml version="1.0"?>
 
 fn state_of<'v>(answer: &'v Value, first: &str, second: &str) -> &'v Value {
     answer["pairs"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
         .find(|pair| {
-            let names = pair["pair"].as_array().unwrap();
+            let names = pair["pair"].list();
             names.contains(&first.into()) && names.contains(&second.into())
         })
         .unwrap()
@@ -35,25 +34,16 @@ fn state_of<'v>(answer: &'v Value, first: &str, second: &str) -> &'v Value {
 #[test]
 fn every_pair_of_bodies_has_a_state_and_its_evidence() {
     let bench = Bench::with_scenario(SMALL);
-    let answer = run(&bench, &["--json"]);
+    let answer = run(&bench, "--json");
     let answer = answer.exits_with(0).json();
-    has_keys(&answer, &["schema_version", "samples", "seed", "pairs"]);
-    let pairs = answer["pairs"].as_array().unwrap();
+    has_keys(&answer, "schema_version samples seed pairs");
+    let pairs = answer["pairs"].list();
     // Thirteen bodies: base, six links, tool, guide tube, corridor, phantom, table, mount.
     assert_eq!(pairs.len(), 13 * 12 / 2);
     for pair in pairs {
         has_keys(
             pair,
-            &[
-                "pair",
-                "class",
-                "state",
-                "measured",
-                "joints_between",
-                "least_m",
-                "least_joints_rad",
-                "collision_rate",
-            ],
+            "pair class state measured joints_between least_m least_joints_rad collision_rate",
         );
         assert_eq!(pair["measured"] == true, pair["class"].is_string());
     }
@@ -64,7 +54,7 @@ fn every_pair_of_bodies_has_a_state_and_its_evidence() {
     assert_eq!(state_of(&answer, "forearm", "wrist_3")["state"], "checked");
     let never = state_of(&answer, "wrist_1", "wrist_3");
     assert_eq!(never["state"], "never");
-    assert!(never["nearest_m"]["lower"].as_f64().unwrap() > 0.0);
+    assert!(never["nearest_m"]["lower"].number() > 0.0);
     assert_eq!(never["measured"], true);
     assert_eq!(state_of(&answer, "table", "mount")["state"], "fixed");
 }
@@ -73,14 +63,8 @@ fn every_pair_of_bodies_has_a_state_and_its_evidence() {
 fn an_srdf_that_disables_what_collides_is_bad_input() {
     let bench = Bench::with_scenario(SMALL);
     bench.write("arm.srdf", SRDF);
-    let answer = run(&bench, &["--srdf", "arm.srdf"]).exits_with(2);
-    assert!(
-        answer
-            .stdout
-            .contains("1 justified, 0 unproven, 1 refuted, 1 with unknown links"),
-        "{}",
-        answer.stdout
-    );
+    let answer = run(&bench, "--srdf arm.srdf").exits_with(2);
+    answer.says(["1 justified, 0 unproven, 1 refuted, 1 with unknown links"]);
     answer.complains([
         "arm.srdf:4",
         "forearm_link and wrist_3_link",
@@ -93,11 +77,9 @@ fn an_srdf_that_disables_what_collides_is_bad_input() {
 #[test]
 fn what_it_writes_it_agrees_with() {
     let bench = Bench::with_scenario(SMALL);
-    run(&bench, &["--write-srdf", "own.srdf"]).exits_with(0);
-    let answer = run(&bench, &["--srdf", "own.srdf", "--json"])
-        .exits_with(0)
-        .json();
-    let disabled = answer["srdf"]["disabled"].as_array().unwrap();
+    run(&bench, "--write-srdf own.srdf").exits_with(0);
+    let answer = run(&bench, "--srdf own.srdf --json").exits_with(0).json();
+    let disabled = answer["srdf"]["disabled"].list();
     assert!(disabled.len() >= 7, "{disabled:#?}");
     for pair in disabled {
         assert_eq!(pair["verdict"], "justified", "{pair:#}");

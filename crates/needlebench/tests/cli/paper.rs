@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::support::{Bench, has_keys, numbers};
+use crate::support::{Bench, Json, has_keys, numbers};
 
 /// One run without pictures, shared by all tests.
 fn reproduction() -> &'static (Bench, Value) {
@@ -13,7 +13,7 @@ fn reproduction() -> &'static (Bench, Value) {
     RUN.get_or_init(|| {
         let bench = Bench::new();
         bench
-            .run(&["paper", "--out", "p", "--no-pictures", "--quiet"])
+            .run("paper --out p --no-pictures --quiet")
             .exits_with(0);
         let report = bench.read_json("p/paper.json");
         (bench, report)
@@ -25,7 +25,7 @@ fn report() -> &'static Value {
 }
 
 fn array(value: &Value) -> &Vec<Value> {
-    value.as_array().unwrap()
+    value.list()
 }
 
 fn number(value: &Value) -> f64 {
@@ -58,23 +58,7 @@ const SHARE: f64 = 0.015;
 fn report_passes_and_has_its_keys() {
     has_keys(
         report(),
-        &[
-            "schema_version",
-            "paper",
-            "verdict",
-            "checks",
-            "table_3",
-            "equations",
-            "equation_45",
-            "solver_variants",
-            "solution_counts",
-            "accuracy",
-            "convergence",
-            "free_space",
-            "files",
-            "provenance",
-            "timings",
-        ],
+        "schema_version paper verdict checks table_3 equations equation_45 solver_variants solution_counts accuracy convergence free_space files provenance timings",
     );
     assert_eq!(report()["verdict"], "pass");
     assert!(
@@ -132,7 +116,7 @@ fn every_corrected_equation_holds_and_every_verdict_is_borne_out() {
     let equations = array(&report()["equations"]);
     for number in 1..=47_u32 {
         let covered = equations.iter().any(|equation| {
-            let words = equation["number"].as_str().unwrap();
+            let words = equation["number"].word();
             words.split(", ").any(|word| word == number.to_string())
         });
         assert!(covered, "equation {number} is missing");
@@ -298,7 +282,7 @@ fn without_timings(bench: &Bench) -> Value {
 #[test]
 fn second_run_differs_in_timings_only_and_prints_what_it_writes() {
     let bench = Bench::new();
-    let answer = bench.run(&["paper", "--out", "p", "--no-pictures", "--json"]);
+    let answer = bench.run("paper --out p --no-pictures --json");
     let answer = answer.exits_with(0);
     assert_eq!(answer.json(), bench.read_json("p/paper.json"));
     assert_eq!(without_timings(&bench), without_timings(&reproduction().0));
@@ -306,7 +290,7 @@ fn second_run_differs_in_timings_only_and_prints_what_it_writes() {
 
 #[test]
 fn page_is_self_contained_and_well_formed_enough() {
-    let page = String::from_utf8(reproduction().0.read("p/paper.html")).unwrap();
+    let page = reproduction().0.text("p/paper.html");
     for outside in [
         "http:",
         "https:",
@@ -347,14 +331,14 @@ fn page_is_self_contained_and_well_formed_enough() {
 #[test]
 fn pictures_are_written_and_within_the_page() {
     let bench = Bench::new();
-    let answer = bench.run(&["paper", "--out", "p"]).exits_with(0);
-    assert!(answer.stdout.contains("PASS"), "{}", answer.stdout);
+    let answer = bench.run("paper --out p").exits_with(0);
+    answer.says(["PASS"]);
     let files = bench.tree("p");
     assert_eq!(files.len(), 8 + 3, "{files:?}");
-    let page = String::from_utf8(bench.read("p/paper.html")).unwrap();
+    let page = bench.text("p/paper.html");
     assert_eq!(page.matches("src=\"data:image/png;base64,").count(), 8);
     for configuration in array(&report()["free_space"]["configurations"]) {
-        let name = format!("p/{}.png", configuration["label"].as_str().unwrap());
+        let name = format!("p/{}.png", configuration["label"].word());
         assert!(bench.read(&name).starts_with(b"\x89PNG"));
     }
 }
@@ -365,7 +349,7 @@ fn interrupted_reproduction_ends_with_130_and_writes_nothing() {
     use std::process::Stdio;
 
     let bench = Bench::new();
-    let mut command = bench.command(&["paper", "--out", "p"]);
+    let mut command = bench.command("paper --out p");
     let mut child = command
         .stdout(Stdio::null())
         .stderr(Stdio::null())

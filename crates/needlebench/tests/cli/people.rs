@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Bench, SMALL, with_edit};
+use crate::support::{Bench, Json, SMALL, with_edit};
 
 /// `SMALL` with people.
 fn with_people(people: &str) -> String {
@@ -10,7 +10,7 @@ fn with_people(people: &str) -> String {
 }
 
 fn rooms(report: &Value) -> Vec<&Value> {
-    let configurations = report["goals"][0]["configurations"].as_array().unwrap();
+    let configurations = report["goals"][0]["configurations"].list();
     configurations.iter().map(|each| &each["room"]).collect()
 }
 
@@ -20,14 +20,14 @@ fn room_is_reported_for_every_posture_with_people_or_without() {
                   [[people.persons]]\nside = \"feet\"\nstature = \"female-p5\"\n";
     let bench = Bench::with_scenario(&with_people(people));
     let report = bench
-        .run(&["run", "s.toml", "--engine", "rapier", "--json"])
+        .run("run s.toml --engine rapier --json")
         .exits_with(0)
         .json();
     for room in rooms(&report) {
         for key in ["free_fraction", "sight_fraction"] {
-            assert!((0.0..=1.0).contains(&room[key].as_f64().unwrap()), "{key}");
+            assert!((0.0..=1.0).contains(&room[key].number()), "{key}");
         }
-        assert_eq!(room["sight"].as_array().unwrap().len(), 1);
+        assert_eq!(room["sight"].list().len(), 1);
         assert_eq!(room["sight"][0]["side"], "feet");
         assert_eq!(room["sight"][0]["stature_m"], 1.505);
         assert_eq!(
@@ -38,12 +38,12 @@ fn room_is_reported_for_every_posture_with_people_or_without() {
     }
 
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["run", "s.toml", "--engine", "rapier", "--wide"]);
+    let answer = bench.run("run s.toml --engine rapier --wide");
     assert!(answer.exits_with(0).stdout.contains("room for people"));
     let report = bench.read_json("out/small/report.json");
     for room in rooms(&report) {
         // The default: a doctor in three statures, across the patient from the robot.
-        assert_eq!(room["sight"].as_array().unwrap().len(), 3);
+        assert_eq!(room["sight"].list().len(), 3);
         assert_eq!(room["sight"][0]["side"], "left");
         assert_eq!(room["elbow_as_preferred"], Value::Null);
     }
@@ -55,10 +55,10 @@ fn room_criteria_are_judged_and_name_what_blocks() {
                   min_hand_cone_deg = 80\n";
     let bench = Bench::with_scenario(&with_edit(SMALL, "[criteria]\n", limits));
     let report = bench
-        .run(&["run", "s.toml", "--engine", "rapier", "--json"])
+        .run("run s.toml --engine rapier --json")
         .exits_with(1)
         .json();
-    let results = report["criteria"].as_array().unwrap();
+    let results = report["criteria"].list();
     let of = |key: &str| -> Vec<&Value> {
         let named = |each: &&Value| each["criterion"] == key;
         results.iter().filter(named).collect()
@@ -71,6 +71,6 @@ fn room_criteria_are_judged_and_name_what_blocks() {
             .all(|each| each["pass"] == true)
     );
     for each in of("min_hand_cone_deg") {
-        assert!(each["detail"].as_str().unwrap().starts_with("blocked by "));
+        assert!(each["detail"].word().starts_with("blocked by "));
     }
 }

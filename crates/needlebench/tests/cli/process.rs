@@ -74,7 +74,7 @@ impl LongRun {
     pub fn start() -> Self {
         crate::support::mujoco_is_ready();
         let bench = Bench::with_scenario(&long_scenario());
-        let arguments = ["run", "s.toml", "--engine", "both", "--jobs", "2"];
+        let arguments = "run s.toml --engine both --jobs 2";
         let child = bench
             .command(&arguments)
             .process_group(0)

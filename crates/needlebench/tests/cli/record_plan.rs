@@ -3,7 +3,7 @@
 use needlebench_kinematics::{Joints, UrModel, rotation_vector};
 use serde_json::Value;
 
-use crate::support::{Bench, numbers, with_edit};
+use crate::support::{Bench, Json, holds, numbers, with_edit};
 
 /// A run of a few seconds, rapier alone.
 const SMALL: &str = r#"
@@ -38,7 +38,7 @@ centre_mm = [40, 0, 25]
 "#;
 
 fn text(bench: &Bench, name: &str) -> String {
-    String::from_utf8(bench.read(name)).unwrap()
+    bench.text(name)
 }
 
 /// A log's columns by name.
@@ -77,17 +77,17 @@ impl Log {
 #[test]
 fn plan_keeps_what_is_asked_for_and_is_the_same_again() {
     let bench = Bench::new();
-    let arguments = ["record-plan", "--arm", "ur3e", "--poses", "12", "--json"];
+    let arguments = "record-plan --arm ur3e --poses 12 --json";
     let plan = bench.run(&arguments).exits_with(0).json();
-    assert!(plan["planned"]["minimum_certified_m"].as_f64().unwrap() >= 0.005);
-    for motion in plan["motions"].as_array().unwrap() {
+    assert!(plan["planned"]["minimum_certified_m"].number() >= 0.005);
+    for motion in plan["motions"].list() {
         for (class, found) in motion["clearance"].as_object().unwrap() {
             let least_m = match class.as_str() {
                 "self" => 0.005,
                 "robot_mount" => 0.03,
                 _ => continue,
             };
-            let proven_m = found["certified_lower_bound_m"].as_f64().unwrap();
+            let proven_m = found["certified_lower_bound_m"].number();
             assert!(proven_m >= least_m, "{motion}");
         }
     }
@@ -109,38 +109,24 @@ fn plan_keeps_what_is_asked_for_and_is_the_same_again() {
     for key in ["calibration_condition", "flange_rms_m", "flange_worst_m"] {
         assert!(here[key].as_f64() < random[key].as_f64(), "{key}: {plan:#}");
     }
-    for joint in here["joints"].as_array().unwrap() {
+    for joint in here["joints"].list() {
         assert_eq!(joint["torque_constant_identified"], true, "{joint}");
     }
 
     let scenario = "out/ur3e/excitation.toml";
-    let answer = bench.run(&["check", scenario]).exits_with(0);
-    assert!(
-        answer
-            .stdout
-            .contains("excitation run, 12 postures, 2 payloads")
-    );
+    let answer = bench.run(format!("check {scenario}")).exits_with(0);
+    answer.says(["excitation run, 12 postures, 2 payloads"]);
 }
 
 #[test]
 fn script_makes_the_motions_of_the_scenario() {
     let bench = Bench::with_scenario(SMALL);
     bench
-        .run(&[
-            "record-plan",
-            "s.toml",
-            "--poses",
-            "10",
-            "--payload-kg",
-            "0,0.5",
-        ])
+        .run("record-plan s.toml --poses 10 --payload-kg 0,0.5")
         .exits_with(0);
     let script = text(&bench, "out/small/excitation.script");
     let scenario = text(&bench, "out/small/excitation.toml");
-    assert!(
-        scenario.contains("name = \"small_excitation\""),
-        "{scenario}"
-    );
+    holds(&scenario, ["name = \"small_excitation\""]);
     let postures: Vec<Vec<f64>> = scenario
         .lines()
         .filter(|line| line.starts_with("    ["))
@@ -187,16 +173,12 @@ fn script_makes_the_motions_of_the_scenario() {
 #[test]
 fn logs_say_what_a_controller_would() {
     let bench = Bench::with_scenario(SMALL);
-    let report = bench
-        .run(&["run", "s.toml", "--json", "--quiet"])
-        .exits_with(0)
-        .json();
+    let report = bench.run("run s.toml --json --quiet").exits_with(0).json();
     assert_eq!(report["verdict"], "pass");
     let files: Vec<&str> = report["excitation"]["files"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
-        .map(|file| file.as_str().unwrap())
+        .map(|file| file.word())
         .collect();
     assert_eq!(
         files,
@@ -224,7 +206,7 @@ fn logs_say_what_a_controller_would() {
             moved += log.six(row, "target_qd").abs();
             assert_eq!(log.one(row, "robot_mode"), 7.0);
             assert_eq!(log.one(row, "joint_mode_5"), 253.0);
-            assert!((log.one(row, "payload") - load["payload_kg"].as_f64().unwrap()).abs() < 1e-8);
+            assert!((log.one(row, "payload") - load["payload_kg"].number()).abs() < 1e-8);
         }
         assert!(moved.min() > 0.0, "every joint moves");
         let step_s = log.one(&log.rows[1], "timestamp") - log.one(&log.rows[0], "timestamp");
@@ -246,8 +228,7 @@ fn logs_say_what_a_controller_would() {
     let height = |q: &Joints| (geometry.base_from_flange(q) * centre).z;
     let report_kg = numbers(&serde_json::json!(
         report["excitation"]["loads"]
-            .as_array()
-            .unwrap()
+            .list()
             .iter()
             .map(|load| load["added_kg"].clone())
             .collect::<Vec<Value>>()
@@ -269,9 +250,7 @@ fn logs_say_what_a_controller_would() {
 #[test]
 fn currents_are_left_out_where_no_constants_are_known() {
     let bench = Bench::with_scenario(&with_edit(SMALL, "\"ur3e\"", "\"ur5e\""));
-    bench
-        .run(&["run", "s.toml", "--quiet", "--no-page"])
-        .exits_with(0);
+    bench.run("run s.toml --quiet --no-page").exits_with(0);
     let log = Log::read(&text(&bench, "out/small/payload_1.rapier.rtde.csv"));
     assert!(log.has("target_moment_5") && !log.has("target_current_0"));
 }
@@ -281,9 +260,7 @@ fn currents_are_left_out_where_no_constants_are_known() {
 fn actual_angles_are_what_encoders_read() {
     let imperfect = format!("{SMALL}\n[imperfections.encoder]\n");
     let bench = Bench::with_scenario(&imperfect);
-    bench
-        .run(&["run", "s.toml", "--quiet", "--no-page"])
-        .exits_with(0);
+    bench.run("run s.toml --quiet --no-page").exits_with(0);
     let offsets = [1, 2].map(|load| {
         let log = Log::read(&text(
             &bench,
@@ -301,15 +278,7 @@ fn actual_angles_are_what_encoders_read() {
 #[test]
 fn any_run_writes_logs_on_request() {
     let bench = Bench::with_scenario(crate::support::SMALL);
-    let arguments = [
-        "run",
-        "s.toml",
-        "--engine",
-        "rapier",
-        "--quiet",
-        "--no-page",
-        "--rtde",
-    ];
+    let arguments = "run s.toml --engine rapier --quiet --no-page --rtde";
     bench.run(&arguments);
     let logs: Vec<_> = bench
         .tree("out/small/pose")

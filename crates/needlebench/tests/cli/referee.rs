@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Bench, SMALL, has_keys, mujoco_is_ready, with_edit};
+use crate::support::{Bench, Json, SMALL, has_keys, holds, mujoco_is_ready, with_edit};
 
 /// `SMALL` with another envelope.
 fn with_envelope(keys: &str) -> String {
@@ -10,7 +10,7 @@ fn with_envelope(keys: &str) -> String {
 }
 
 fn simulated(report: &Value) -> Vec<&Value> {
-    let configurations = report["goals"][0]["configurations"].as_array().unwrap();
+    let configurations = report["goals"][0]["configurations"].list();
     configurations
         .iter()
         .filter(|each| each["engine_difference"].is_object())
@@ -21,12 +21,10 @@ fn simulated(report: &Value) -> Vec<&Value> {
 fn referee_measures_both_engines_and_their_order() {
     mujoco_is_ready();
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench
-        .run(&["run", "s.toml", "--referee", "--wide"])
-        .exits_with(0);
-    assert!(answer.stdout.contains("each engine beside the referee"));
+    let answer = bench.run("run s.toml --referee --wide").exits_with(0);
+    answer.says(["each engine beside the referee"]);
     let report = bench.read_json("out/small/report.json");
-    let engines = report["provenance"]["engines"].as_array().unwrap();
+    let engines = report["provenance"]["engines"].list();
     assert!(engines.iter().any(|each| each["name"] == "referee"));
     let simulated = simulated(&report);
     assert!(!simulated.is_empty());
@@ -35,43 +33,22 @@ fn referee_measures_both_engines_and_their_order() {
             let found = &configuration["referee"][engine];
             has_keys(
                 found,
-                &[
-                    "until_s",
-                    "closed_loop",
-                    "held_torques",
-                    "convergence",
-                    "order",
-                    "documented_order",
-                ],
+                "until_s closed_loop held_torques convergence order documented_order",
             );
             let held = &found["held_torques"];
             has_keys(
                 held,
-                &[
-                    "window_s",
-                    "windows",
-                    "peak_tip_m",
-                    "peak_time_s",
-                    "growth",
-                    "convergence",
-                    "order",
-                ],
+                "window_s windows peak_tip_m peak_time_s growth convergence order",
             );
             assert_eq!(held["window_s"], 0.05);
-            assert!(held["growth"].as_f64().unwrap() < 1.1, "{held}");
+            assert!(held["growth"].number() < 1.1, "{held}");
             // Nothing pulls the engine back, so a torque at its limit changes nothing.
-            assert!(
-                (held["order"].as_f64().unwrap() - 1.0).abs() < 0.25,
-                "{held}"
-            );
+            assert!((held["order"].number() - 1.0).abs() < 0.25, "{held}");
             if configuration["engines"][engine]["saturated_steps"] == 0 {
-                assert!(
-                    (found["order"].as_f64().unwrap() - 1.0).abs() < 0.25,
-                    "{found}"
-                );
+                assert!((found["order"].number() - 1.0).abs() < 0.25, "{found}");
             }
-            assert_eq!(held["convergence"].as_array().unwrap().len(), 3);
-            assert_eq!(found["convergence"].as_array().unwrap().len(), 3);
+            assert_eq!(held["convergence"].list().len(), 3);
+            assert_eq!(found["convergence"].list().len(), 3);
         }
     }
 }
@@ -80,22 +57,19 @@ fn referee_measures_both_engines_and_their_order() {
 fn difference_beyond_the_envelope_fails_and_is_explained() {
     mujoco_is_ready();
     let bench = Bench::with_scenario(&with_envelope("peak_tip_um = 0.001"));
-    let answer = bench.run(&["run", "s.toml"]).exits_with(1);
-    assert!(answer.stdout.contains("is nearer to the referee"));
+    let answer = bench.run("run s.toml").exits_with(1);
+    answer.says(["is nearer to the referee"]);
     let report = bench.read_json("out/small/report.json");
     let broken: Vec<&Value> = report["criteria"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
         .filter(|each| each["criterion"] == "engines.envelope.peak_tip_um")
         .filter(|each| each["pass"] == false)
         .collect();
     assert!(!broken.is_empty());
     for criterion in broken {
-        let detail = criterion["detail"].as_str().unwrap();
-        for part in ["engines differ from", "likely cause:", " ms"] {
-            assert!(detail.contains(part), "{detail}");
-        }
+        let detail = criterion["detail"].word();
+        holds(&detail, ["engines differ from", "likely cause:", " ms"]);
     }
     for configuration in simulated(&report) {
         let quantities = configuration["adjudication"]["quantities"].as_array();
@@ -103,10 +77,7 @@ fn difference_beyond_the_envelope_fails_and_is_explained() {
             let is_broken = quantity["pass"] == false;
             assert_eq!(quantity["ruling"].is_object(), is_broken);
             if is_broken {
-                has_keys(
-                    &quantity["ruling"],
-                    &["first_time_s", "nearer", "cause", "evidence"],
-                );
+                has_keys(&quantity["ruling"], "first_time_s nearer cause evidence");
                 assert_eq!(quantity["ruling"]["cause"], "step_too_long");
             }
         }

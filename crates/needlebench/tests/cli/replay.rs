@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::support::{Answer, Bench, mujoco_is_ready, workspace};
+use crate::support::{Answer, Bench, Json, holds, mujoco_is_ready, workspace};
 
 fn shipped() -> String {
     let path = workspace().join("models/ur3e/recorded/ur3e_rad_20211005.csv");
@@ -18,17 +18,10 @@ fn number(value: &Value) -> f64 {
 }
 
 /// A replay in rapier alone, without pictures.
-fn quick(bench: &Bench, log: &str, more: &[&str]) -> Answer {
-    let mut arguments = vec![
-        "replay",
-        log,
-        "--engine",
-        "rapier",
-        "--no-pictures",
-        "--no-page",
-    ];
-    arguments.extend(more);
-    bench.run(&arguments)
+fn quick(bench: &Bench, log: &str, more: &str) -> Answer {
+    bench.run(format!(
+        "replay '{log}' --engine rapier --no-pictures --no-page {more}"
+    ))
 }
 
 #[test]
@@ -36,24 +29,15 @@ fn the_shipped_log_is_replayed_in_both_engines_and_meets_its_criteria() {
     mujoco_is_ready();
     let bench = Bench::new();
     let log = shipped();
-    let limits = [
-        "--max-moment-rms",
-        "0.02",
-        "--max-calibration",
-        "0.1",
-        "--max-tracking",
-        "0.5",
-        "--max-current-rms",
-        "0.2",
-    ];
-    let mut arguments = vec!["replay", log.as_str(), "--json"];
-    arguments.extend(limits);
-    let report = bench.run(&arguments).exits_with(0).json();
+    let limits =
+        "--max-moment-rms 0.02 --max-calibration 0.1 --max-tracking 0.5 --max-current-rms 0.2";
+    let report = bench.run(format!("replay '{log}' --json {limits}"));
+    let report = report.exits_with(0).json();
     assert_eq!(report["verdict"], "pass");
     assert_eq!(report["arm"]["name"], "UR3e");
     assert_eq!(report["log"]["rows"], 888);
     // One for moment and calibration, two of each engine.
-    assert_eq!(report["criteria"].as_array().unwrap().len(), 6);
+    assert_eq!(report["criteria"].list().len(), 6);
     let lag_s = number(&report["real"]["lag_of_all_s"]["value"]);
     assert!((lag_s - 0.5e-3).abs() < 0.1e-3, "{lag_s}");
     assert!(number(&report["calibration"]["held_out"]["rms_m"]) < 1e-4);
@@ -61,12 +45,7 @@ fn the_shipped_log_is_replayed_in_both_engines_and_meets_its_criteria() {
         let found = &report["engines"][engine];
         assert_eq!(found["rows"], 888);
         // The currents of the real arm are met as well as its own law meets them.
-        for (joint, rms) in found["current_rms_a"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .enumerate()
-        {
+        for (joint, rms) in found["current_rms_a"].list().iter().enumerate() {
             assert!(number(rms) < 0.15, "{engine} {joint}: {rms}");
         }
     }
@@ -89,65 +68,44 @@ fn the_shipped_log_is_replayed_in_both_engines_and_meets_its_criteria() {
         assert!(folder.join(file).exists(), "{file}");
     }
     let junit = fs::read_to_string(folder.join("junit.xml")).unwrap();
-    assert!(
-        junit.contains("tests=\"6\"") && junit.contains("failures=\"0\""),
-        "{junit}"
-    );
+    holds(&junit, ["tests=\"6\"", "failures=\"0\""]);
 }
 
 #[test]
 fn the_arms_data_that_are_written_are_used_by_scenarios() {
     let bench = Bench::new();
-    quick(&bench, &shipped(), &[]).exits_with(0);
+    quick(&bench, &shipped(), "").exits_with(0);
     let scenario = "name = \"mine\"\n[robot]\narm = \"out/ur3e_rad_20211005/arm.toml\"\n\
                     base_rpy_deg = [0, 0, 180]\n[[goals]]\nname = \"g\"\ninsertion_length_mm = 100\n\
                     [goals.flange_pose]\nposition_mm = [194.2, -359.3, 170.1]\n\
                     rotation_vector_rad = [-0.8567, 2.7197, -1.1407]\n";
     bench.write("mine.toml", scenario);
-    let checked = bench.run(&["check", "mine.toml"]).exits_with(0);
-    assert!(
-        checked.stdout.contains("calibration.yaml"),
-        "{}",
-        checked.stdout
-    );
+    let checked = bench.run("check mine.toml").exits_with(0);
+    checked.says(["calibration.yaml"]);
     // The calibration is that of the arm: its log is met by it to the digits of the log.
-    let overridden = bench.run(&[
-        "fk",
-        "--joints",
-        "0,-1.57,-1,-1.57,1.57,0",
-        "--calibration",
-        "out/ur3e_rad_20211005/calibration.yaml",
-        "--robot",
-        "ur3e",
-    ]);
+    let overridden = bench.run("fk --joints 0,-1.57,-1,-1.57,1.57,0 --calibration out/ur3e_rad_20211005/calibration.yaml --robot ur3e");
     overridden.exits_with(0);
-    let sheet = bench.run(&["servo", "mine.toml", "--engine", "rapier", "--no-pictures"]);
+    let sheet = bench.run("servo mine.toml --engine rapier --no-pictures");
     assert!(sheet.exits_with(0).stdout.contains("identified from"));
 }
 
 #[test]
 fn limits_that_are_missed_or_cannot_be_judged_fail() {
     let bench = Bench::new();
-    let missed = quick(&bench, &shipped(), &["--max-tracking", "0.01"]).exits_with(1);
-    assert!(
-        missed.stdout.contains("FAILED max_tracking_mm in rapier"),
-        "{}",
-        missed.stdout
-    );
+    let missed = quick(&bench, &shipped(), "--max-tracking 0.01").exits_with(1);
+    missed.says(["FAILED max_tracking_mm in rapier"]);
     // Without set-points there is nothing to replay, and that is said.
     let text = fs::read_to_string(shipped())
         .unwrap()
         .replacen("target_", "x_target_", 1000);
     bench.write("untargeted.csv", &text);
-    let open = quick(&bench, "untargeted.csv", &["--max-tracking", "1"]).exits_with(1);
-    for part in [
+    let open = quick(&bench, "untargeted.csv", "--max-tracking 1").exits_with(1);
+    open.says([
         "INCOMPLETE",
         "NOT JUDGED max_tracking_mm",
         "nothing to replay",
-    ] {
-        assert!(open.stdout.contains(part), "{part}: {}", open.stdout);
-    }
-    quick(&bench, "untargeted.csv", &[]).exits_with(0);
+    ]);
+    quick(&bench, "untargeted.csv", "").exits_with(0);
 }
 
 #[test]
@@ -158,23 +116,15 @@ fn what_is_wrong_with_a_log_is_said_with_its_place() {
     let swapped = lines[10].replacen("1550297", "1550290", 1);
     lines[10] = &swapped;
     bench.write("back.csv", &(lines.join("\n") + "\n"));
-    let refused = quick(&bench, "back.csv", &[]).exits_with(2);
-    assert!(refused.stderr.contains("back.csv:"), "{}", refused.stderr);
-    assert!(
-        refused.stderr.contains("the clock goes back"),
-        "{}",
-        refused.stderr
-    );
+    let refused = quick(&bench, "back.csv", "").exits_with(2);
+    refused.complains(["back.csv:"]);
+    refused.complains(["the clock goes back"]);
     // Without poses the arm has to be named.
     let anonymous = text.replacen("TCP_pose", "TCP_place", 1000);
     bench.write("anonymous.csv", &anonymous);
-    let refused = quick(&bench, "anonymous.csv", &[]).exits_with(2);
-    assert!(
-        refused.stderr.contains("does not say which arm"),
-        "{}",
-        refused.stderr
-    );
-    quick(&bench, "anonymous.csv", &["--arm", "ur3e"]).exits_with(0);
+    let refused = quick(&bench, "anonymous.csv", "").exits_with(2);
+    refused.complains(["does not say which arm"]);
+    quick(&bench, "anonymous.csv", "--arm ur3e").exits_with(0);
 }
 
 #[test]
@@ -184,14 +134,10 @@ fn a_scenario_gives_criteria_and_the_command_line_goes_before_it() {
                     insertion_length_mm = 100\n[goals.flange_pose]\nposition_mm = [200, -300, 200]\n\
                     rotation_vector_rad = [0, 3.14, 0]\n[replay]\nmax_moment_rms_nm = 1e-6\n";
     bench.write("s.toml", scenario);
-    let missed = quick(&bench, &shipped(), &["--scenario", "s.toml"]).exits_with(1);
-    assert!(
-        missed.stdout.contains("FAILED max_moment_rms_nm"),
-        "{}",
-        missed.stdout
-    );
-    let more = ["--scenario", "s.toml", "--max-moment-rms", "0.02"];
-    quick(&bench, &shipped(), &more).exits_with(0);
+    let missed = quick(&bench, &shipped(), "--scenario s.toml").exits_with(1);
+    missed.says(["FAILED max_moment_rms_nm"]);
+    let more = "--scenario s.toml --max-moment-rms 0.02";
+    quick(&bench, &shipped(), more).exits_with(0);
 }
 
 #[test]
@@ -199,7 +145,7 @@ fn the_same_log_gives_the_same_bytes() {
     let bench = Bench::new();
     let log = shipped();
     let read = || {
-        quick(&bench, &log, &[]).exits_with(0);
+        quick(&bench, &log, "").exits_with(0);
         ["replay.json", "course.rapier.csv", "arm.toml"]
             .map(|file| fs::read(bench.path("out/ur3e_rad_20211005").join(file)).unwrap())
     };
@@ -213,31 +159,14 @@ fn a_recorded_run_of_ours_gives_back_what_was_put_in() {
     /// Estimates are within this many of their own intervals: of thirty of 95 % one or two are outside one.
     const INTERVALS: f64 = 2.5;
     let bench = Bench::new();
-    let plan = [
-        "record-plan",
-        "--arm",
-        "ur3e",
-        "--poses",
-        "12",
-        "--payload-kg",
-        "0.8",
-        "--out",
-        "out",
-    ];
+    let plan = "record-plan --arm ur3e --poses 12 --payload-kg 0.8 --out out";
     bench.run(&plan).exits_with(0);
-    let mut scenario = String::from_utf8(bench.read("out/ur3e/excitation.toml")).unwrap();
+    let mut scenario = bench.text("out/ur3e/excitation.toml");
     scenario += "\n[imperfections.calibration]\narm = \"population\"\n[imperfections.friction]\n\
                  [imperfections.encoder]\n";
     bench.write("mine.toml", &scenario);
     bench
-        .run(&[
-            "run",
-            "mine.toml",
-            "--engine",
-            "rapier",
-            "--quiet",
-            "--no-pictures",
-        ])
+        .run("run mine.toml --engine rapier --quiet --no-pictures")
         .exits_with(0);
     let folder = bench.path("out/ur3e_excitation");
     let logs: Vec<_> = fs::read_dir(&folder)
@@ -247,7 +176,7 @@ fn a_recorded_run_of_ours_gives_back_what_was_put_in() {
         .collect();
     assert_eq!(logs.len(), 1, "{logs:?}");
     let truth = bench.read_json("out/ur3e_excitation/report.json")["truth"].clone();
-    let report = quick(&bench, logs[0].to_str().unwrap(), &["--json"])
+    let report = quick(&bench, logs[0].to_str().unwrap(), "--json")
         .exits_with(0)
         .json();
     assert_eq!(report["arm"]["name"], "UR3e");

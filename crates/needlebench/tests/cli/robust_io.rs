@@ -6,17 +6,17 @@ use std::process::Stdio;
 use crate::support::{Bench, SMALL, with_edit};
 
 /// One line of each command that fails at once.
-const FAILING: [&[&str]; 10] = [
-    &["check", "nosuch.toml"],
-    &["run", "nosuch.toml"],
-    &["study", "nosuch.toml"],
-    &["merge", "nosuch.toml", "shard"],
-    &["compare", "nosuch", "nosuch"],
-    &["atlas", "nosuch.toml"],
-    &["iso9283", "--csv", "nosuch", "--commanded", "nosuch"],
-    &["pairs", "nosuch.toml"],
-    &["servo", "nosuch.toml"],
-    &["ik", "nosuch.toml", "--goal", "pose"],
+const FAILING: [&str; 10] = [
+    "check nosuch.toml",
+    "run nosuch.toml",
+    "study nosuch.toml",
+    "merge nosuch.toml shard",
+    "compare nosuch nosuch",
+    "atlas nosuch.toml",
+    "iso9283 --csv nosuch --commanded nosuch",
+    "pairs nosuch.toml",
+    "servo nosuch.toml",
+    "ik nosuch.toml --goal pose",
 ];
 
 #[cfg(target_os = "linux")]
@@ -35,11 +35,7 @@ fn a_full_standard_error_changes_no_exit_status() {
 #[test]
 fn a_full_standard_output_is_an_error_that_is_told() {
     let bench = Bench::with_scenario(SMALL);
-    for arguments in [
-        &["check", "s.toml"][..],
-        &["schema", "scenario"],
-        &["completions", "bash"],
-    ] {
+    for arguments in ["check s.toml", "schema scenario", "completions bash"] {
         let full = File::options().write(true).open("/dev/full").unwrap();
         let mut command = bench.command(arguments);
         let output = command
@@ -54,18 +50,18 @@ fn a_full_standard_output_is_an_error_that_is_told() {
 }
 
 /// Every argument that names a file to read, with `FILE` in its place.
-const READING: [&[&str]; 11] = [
-    &["check", "FILE"],
-    &["run", "FILE"],
-    &["study", "FILE"],
-    &["compare", "FILE", "FILE"],
-    &["compare", "s.toml", "s.toml", "--thresholds", "FILE"],
-    &["iso9283", "--csv", "FILE", "--commanded", "FILE"],
-    &["fk", "--joints", "0,0,0,0,0,0", "--calibration", "FILE"],
-    &["fk", "--joints", "0,0,0,0,0,0", "--robot", "FILE"],
-    &["pairs", "s.toml", "--srdf", "FILE"],
-    &["check", "mesh.toml"],
-    &["check", "tool.toml"],
+const READING: [&str; 11] = [
+    "check FILE",
+    "run FILE",
+    "study FILE",
+    "compare FILE FILE",
+    "compare s.toml s.toml --thresholds FILE",
+    "iso9283 --csv FILE --commanded FILE",
+    "fk --joints 0,0,0,0,0,0 --calibration FILE",
+    "fk --joints 0,0,0,0,0,0 --robot FILE",
+    "pairs s.toml --srdf FILE",
+    "check mesh.toml",
+    "check tool.toml",
 ];
 
 /// Runs all of them on a file; each says why it is refused, and exits with 2.
@@ -78,11 +74,7 @@ fn refused_everywhere(bench: &Bench, file: &str, part: &str) {
     bench.write("tool.toml", with_edit(SMALL, "[tool]", &tool));
     bench.write("s.toml", SMALL);
     for arguments in READING {
-        let arguments: Vec<&str> = arguments
-            .iter()
-            .map(|each| if *each == "FILE" { file } else { each })
-            .collect();
-        let answer = bench.run(&arguments);
+        let answer = bench.run(arguments.replace("FILE", &format!("'{file}'")));
         assert_eq!(answer.status, Some(2), "{arguments:?}: {answer:#?}");
         assert!(answer.stderr.contains(part), "{arguments:?}: {answer:#?}");
     }
@@ -129,9 +121,7 @@ fn the_manifest_of_a_study_that_is_no_text_is_bad_input() {
     bench.write("study.toml", "name = \"one\"\nscenario = \"s.toml\"\n[[factors]]\nname = \"a\"\nkey = \"phantom.position_mm[0]\"\nvalues = [1, 2]\n");
     std::fs::create_dir_all(bench.path("out/one")).unwrap();
     bench.write("out/one/study.json", b"\xff\xfe{}");
-    let answer = bench
-        .run(&["study", "study.toml", "--resume"])
-        .exits_with(2);
+    let answer = bench.run("study study.toml --resume").exits_with(2);
     answer.complains(["study.json", "no UTF-8 text"]);
 }
 
@@ -140,10 +130,10 @@ fn the_manifest_of_a_study_that_is_no_text_is_bad_input() {
 fn what_a_terminal_takes_for_a_command_is_written_out() {
     let bench = Bench::new();
     let name = "a\u{1b}[31m\u{7}.toml";
-    let missing = bench.run(&["check", name]).exits_with(2);
+    let missing = bench.run(format!("check {name}")).exits_with(2);
     missing.complains(["a\\u{1b}[31m\\u{7}.toml"]);
     bench.write(name, SMALL);
-    let found = bench.run(&["check", name]).exits_with(0);
+    let found = bench.run(format!("check {name}")).exits_with(0);
     assert!(
         found.stdout.starts_with("a\\u{1b}[31m\\u{7}.toml: ok"),
         "{found:#?}"
@@ -162,16 +152,9 @@ fn the_summary_takes_no_markup_from_a_description() {
             &format!("{description}name = \"small\""),
         ),
     );
-    let run = [
-        "run",
-        "s.toml",
-        "--engine",
-        "rapier",
-        "--no-pictures",
-        "--no-page",
-    ];
+    let run = "run s.toml --engine rapier --no-pictures --no-page";
     bench.run(&run).exits_with(0);
-    let summary = String::from_utf8(bench.read("out/small/summary.md")).unwrap();
+    let summary = bench.text("out/small/summary.md");
     let line = summary.lines().nth(2).unwrap();
     assert_eq!(line, "\\<b>bold\\</b> \\*\\*x\\*\\* # head \\\\u{1b}[31m");
 }

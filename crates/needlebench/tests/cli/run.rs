@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::support::{Bench, SMALL, has_keys, mujoco_is_ready, numbers, with_edit};
+use crate::support::{Bench, Json, SMALL, has_keys, holds, mujoco_is_ready, numbers, with_edit};
 
 /// The report of `SMALL` in both engines.
 fn report() -> &'static Value {
@@ -13,13 +13,13 @@ fn report() -> &'static Value {
     REPORT.get_or_init(|| {
         mujoco_is_ready();
         let bench = Bench::with_scenario(SMALL);
-        let answer = bench.run(&["run", "s.toml", "--json"]).exits_with(0);
+        let answer = bench.run("run s.toml --json").exits_with(0);
         answer.json()
     })
 }
 
 fn configurations(report: &Value) -> &Vec<Value> {
-    report["goals"][0]["configurations"].as_array().unwrap()
+    report["goals"][0]["configurations"].list()
 }
 
 #[test]
@@ -27,38 +27,18 @@ fn report_has_every_promised_key() {
     let report = report();
     has_keys(
         report,
-        &[
-            "schema_version",
-            "scenario",
-            "provenance",
-            "goals",
-            "verdict",
-            "criteria",
-        ],
+        "schema_version scenario provenance goals verdict criteria",
     );
     assert_eq!(report["schema_version"], 1);
     assert_eq!(report["verdict"], "pass");
     assert_eq!(report["scenario"]["name"], "small");
     let goal = &report["goals"][0];
     assert_eq!(goal["name"], "pose");
-    has_keys(&goal["recommended"], &["label", "reason"]);
+    has_keys(&goal["recommended"], "label reason");
     for configuration in configurations(report) {
         has_keys(
             configuration,
-            &[
-                "label",
-                "status",
-                "rejections",
-                "joints_rad",
-                "roll_rad",
-                "wrap",
-                "ik_residual_m",
-                "ik_residual_rad",
-                "engines",
-                "engine_difference",
-                "clearance",
-                "room",
-            ],
+            "label status rejections joints_rad roll_rad wrap ik_residual_m ik_residual_rad engines engine_difference clearance room",
         );
         assert_eq!(numbers(&configuration["joints_rad"]).len(), 6);
         assert_eq!(numbers(&configuration["wrap"]).len(), 6);
@@ -69,13 +49,13 @@ fn report_has_every_promised_key() {
 fn all_eight_configurations_are_reported_and_rejections_give_their_reason() {
     let labels: BTreeSet<&str> = configurations(report())
         .iter()
-        .map(|each| each["label"].as_str().unwrap())
+        .map(|each| each["label"].word())
         .collect();
     assert_eq!(labels.len(), 8);
     let mut rejected = 0;
     for configuration in configurations(report()) {
-        let rejections = configuration["rejections"].as_array().unwrap();
-        let status = configuration["status"].as_str().unwrap();
+        let rejections = configuration["rejections"].list();
+        let status = configuration["status"].word();
         assert_eq!(
             status,
             if rejections.is_empty() {
@@ -86,7 +66,7 @@ fn all_eight_configurations_are_reported_and_rejections_give_their_reason() {
         );
         for rejection in rejections {
             rejected += 1;
-            has_keys(rejection, &["rule", "value", "limit", "unit", "detail"]);
+            has_keys(rejection, "rule value limit unit detail");
             assert_eq!(rejection["rule"], "needle_corridor");
             assert!(rejection["value"].as_f64() < rejection["limit"].as_f64());
         }
@@ -104,23 +84,13 @@ fn each_engine_reports_every_promised_metric() {
             let measured = &configuration["engines"][engine];
             has_keys(
                 measured,
-                &[
-                    "tip_position_error_m",
-                    "needle_angle_error_rad",
-                    "guide_position_error_m",
-                    "lateral_error_m",
-                    "depth_error_m",
-                    "settling_time_s",
-                    "peak_tracking_error_m",
-                    "peak_torque_ratio",
-                    "contact",
-                ],
+                "tip_position_error_m needle_angle_error_rad guide_position_error_m lateral_error_m depth_error_m settling_time_s peak_tracking_error_m peak_torque_ratio contact",
             );
             assert_eq!(measured["contact"]["occurred"], false);
         }
         has_keys(
             &configuration["engine_difference"],
-            &["peak_tip_m", "settled_tip_m"],
+            "peak_tip_m settled_tip_m",
         );
     }
 }
@@ -144,21 +114,14 @@ fn clearances_name_pair_points_phase_and_time() {
         for (_, found) in clearance.iter().filter(|(_, found)| found.is_object()) {
             // Sampled or attained, nothing is below what is proven.
             if let Some(proven_m) = found["certified_lower_bound_m"].as_f64() {
-                assert!(proven_m <= found["minimum_m"].as_f64().unwrap());
+                assert!(proven_m <= found["minimum_m"].number());
             }
             has_keys(
                 found,
-                &[
-                    "minimum_m",
-                    "certified_lower_bound_m",
-                    "pair",
-                    "witness_points_m",
-                    "phase",
-                    "time_s",
-                ],
+                "minimum_m certified_lower_bound_m pair witness_points_m phase time_s",
             );
-            assert_eq!(found["pair"].as_array().unwrap().len(), 2);
-            for point in found["witness_points_m"].as_array().unwrap() {
+            assert_eq!(found["pair"].list().len(), 2);
+            for point in found["witness_points_m"].list() {
                 assert_eq!(numbers(point).len(), 3);
             }
         }
@@ -170,29 +133,19 @@ fn provenance_identifies_the_program_the_engines_and_every_input() {
     let provenance = &report()["provenance"];
     has_keys(
         provenance,
-        &[
-            "version",
-            "git_revision",
-            "source_sha256",
-            "arithmetic",
-            "cargo_lock_sha256",
-            "engines",
-            "inputs",
-            "seed",
-        ],
+        "version git_revision source_sha256 arithmetic cargo_lock_sha256 engines inputs seed",
     );
     let names: Vec<&Value> = provenance["engines"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
         .map(|engine| &engine["name"])
         .collect();
     assert_eq!(names, ["rapier", "mujoco"]);
-    let inputs = provenance["inputs"].as_array().unwrap();
+    let inputs = provenance["inputs"].list();
     let roles: Vec<&Value> = inputs.iter().map(|input| &input["role"]).collect();
     assert_eq!(roles, ["scenario", "robot", "tool", "arm data", "phantom"]);
     for input in inputs {
-        assert_eq!(input["sha256"].as_str().unwrap().len(), 64);
+        assert_eq!(input["sha256"].word().len(), 64);
     }
 }
 
@@ -200,7 +153,7 @@ fn provenance_identifies_the_program_the_engines_and_every_input() {
 fn results_folder_holds_what_the_report_lists() {
     let text = with_edit(SMALL, "pictures = false", "pictures = true");
     let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["run", "s.toml", "--engine", "rapier", "--out", "results"]);
+    let answer = bench.run("run s.toml --engine rapier --out results");
     let table = answer.exits_with(0).stdout;
     assert!(table.contains("PASS"), "{table}");
     let report = bench.read_json("results/small/report.json");
@@ -219,10 +172,10 @@ fn results_folder_holds_what_the_report_lists() {
     .map(str::to_owned)
     .into();
     for configuration in configurations(&report) {
-        let label = configuration["label"].as_str().unwrap();
+        let label = configuration["label"].word();
         assert!(table.contains(label), "{table}");
-        for file in configuration["files"].as_array().unwrap() {
-            expected.insert(file.as_str().unwrap().to_owned());
+        for file in configuration["files"].list() {
+            expected.insert(file.word().to_owned());
         }
     }
     // Eight pictures of the posture and of the room each, six recordings.
@@ -250,7 +203,7 @@ fn results_folder_holds_what_the_report_lists() {
 #[test]
 fn recording_has_a_row_per_period_and_a_number_in_every_column() {
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["run", "s.toml", "--engine", "rapier"]);
+    let answer = bench.run("run s.toml --engine rapier");
     answer.exits_with(0);
     let bytes = bench.read("out/small/pose/Right-Up-Fold.rapier.csv");
     let text = String::from_utf8(bytes).unwrap();
@@ -284,15 +237,14 @@ fn criterion_that_is_not_met_exits_with_1() {
         "max_tip_position_error_mm = 1\n",
         "max_tip_position_error_mm = 1e-12\n",
     ));
-    let answer = bench.run(&["run", "s.toml", "--engine", "rapier", "--json"]);
+    let answer = bench.run("run s.toml --engine rapier --json");
     let report = answer.exits_with(1).json();
     assert_eq!(report["verdict"], "fail");
     let missed: BTreeSet<&str> = report["criteria"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
         .filter(|criterion| criterion["pass"] == false)
-        .map(|criterion| criterion["criterion"].as_str().unwrap())
+        .map(|criterion| criterion["criterion"].word())
         .collect();
     let expected = ["max_tip_position_error_mm", "min_working_configurations"];
     assert_eq!(missed, BTreeSet::from(expected));
@@ -306,17 +258,16 @@ fn criterion_that_is_not_met_exits_with_1() {
 fn clearance_that_is_not_met_exits_with_1_and_names_the_pair() {
     let criterion = "[criteria.min_clearance_mm]\nrobot_phantom = 500\n[recording]";
     let bench = Bench::with_scenario(&with_edit(SMALL, "[recording]", criterion));
-    let answer = bench.run(&["run", "s.toml", "--engine", "rapier", "--json"]);
+    let answer = bench.run("run s.toml --engine rapier --json");
     let report = answer.exits_with(1).json();
     let missed = report["criteria"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
         .find(|criterion| criterion["pass"] == false)
         .unwrap();
     assert_eq!(missed["criterion"], "min_clearance_mm.robot_phantom");
     assert_eq!(missed["limit"], 0.5);
-    let detail = missed["detail"].as_str().unwrap();
+    let detail = missed["detail"].word();
     assert!(detail.contains("skin"), "{detail}");
 }
 
@@ -324,11 +275,10 @@ fn clearance_that_is_not_met_exits_with_1_and_names_the_pair() {
 fn outcome_that_was_not_expected_exits_with_1() {
     let expected = "[goals.expected]\nLeft-Up-Unfold = \"ok\"\n[motion]";
     let bench = Bench::with_scenario(&with_edit(SMALL, "[motion]", expected));
-    let answer = bench.run(&["run", "s.toml", "--engine", "rapier", "--json"]);
+    let answer = bench.run("run s.toml --engine rapier --json");
     let report = answer.exits_with(1).json();
     let missed = report["criteria"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
         .find(|criterion| criterion["pass"] == false)
         .unwrap();
@@ -341,9 +291,7 @@ fn rejection_that_was_expected_exits_with_0() {
     let expected = "[goals.expected]\nevery = \"ok\"\nLeft-Down-Unfold = \"needle_corridor\"\n\
                     Left-Up-Unfold = \"needle_corridor\"\n[motion]";
     let bench = Bench::with_scenario(&with_edit(SMALL, "[motion]", expected));
-    bench
-        .run(&["run", "s.toml", "--engine", "rapier"])
-        .exits_with(0);
+    bench.run("run s.toml --engine rapier").exits_with(0);
 }
 
 #[test]
@@ -351,7 +299,7 @@ fn chosen_engine_is_the_only_one_that_runs() {
     mujoco_is_ready();
     let bench = Bench::with_scenario(SMALL);
     for (engine, other) in [("rapier", "mujoco"), ("mujoco", "rapier")] {
-        let answer = bench.run(&["run", "s.toml", "--engine", engine, "--json"]);
+        let answer = bench.run(format!("run s.toml --engine {engine} --json"));
         let report = answer.exits_with(0).json();
         let configuration = &configurations(&report)[0];
         assert!(configuration["engines"][engine].is_object());
@@ -370,31 +318,19 @@ fn several_scenarios_come_in_one_document_and_the_worst_status_counts() {
         "max_peak_torque_ratio = 0.01",
     );
     bench.write("strict.toml", strict);
-    let answer = bench.run(&[
-        "run",
-        "s.toml",
-        "strict.toml",
-        "--engine",
-        "rapier",
-        "--json",
-        "--junit",
-        "all.xml",
-    ]);
+    let answer = bench.run("run s.toml strict.toml --engine rapier --json --junit all.xml");
     let answer = answer.exits_with(1).json();
-    has_keys(&answer, &["schema_version", "results"]);
+    has_keys(&answer, "schema_version results");
     let verdicts: Vec<&Value> = answer["results"]
-        .as_array()
-        .unwrap()
+        .list()
         .iter()
         .map(|result| &result["verdict"])
         .collect();
     assert_eq!(verdicts, ["pass", "fail"]);
     assert!(bench.path("out/small/report.json").is_file());
     assert!(bench.path("out/strict/report.json").is_file());
-    let junit = String::from_utf8(bench.read("all.xml")).unwrap();
-    for part in ["<testsuites", "small", "strict", "<failure"] {
-        assert!(junit.contains(part), "{junit}");
-    }
+    let junit = bench.text("all.xml");
+    holds(&junit, ["<testsuites", "small", "strict", "<failure"]);
     // Each case says how long it took, and what was judged against which limit.
     let cases = || junit.split("<testcase ").skip(1);
     assert_eq!(cases().count(), 18);
@@ -414,11 +350,11 @@ fn summary_is_appended_to_the_page_of_a_ci_step() {
     let step = bench.path("step.md").display().to_string();
     let answer = bench.run_with(
         &[("GITHUB_STEP_SUMMARY", Some(&step))],
-        &["run", "s.toml", "--engine", "rapier"],
+        "run s.toml --engine rapier",
     );
     answer.exits_with(0);
-    let page = String::from_utf8(bench.read("step.md")).unwrap();
-    let summary = String::from_utf8(bench.read("out/small/summary.md")).unwrap();
+    let page = bench.text("step.md");
+    let summary = bench.text("out/small/summary.md");
     assert!(page.starts_with("before\n") && page.contains(summary.trim()));
 }
 
@@ -429,13 +365,11 @@ fn robot_of_the_command_line_is_the_one_that_is_reported() {
         "arm.urdf",
         include_str!("../../../../models/ur3/ur3.urdf").replace("\"ur3\"", "\"mine\""),
     );
-    let answer = bench.run(&[
-        "run", "s.toml", "--engine", "rapier", "--robot", "arm.urdf", "--json",
-    ]);
+    let answer = bench.run("run s.toml --engine rapier --robot arm.urdf --json");
     let report = answer.exits_with(0).json();
     assert_eq!(report["provenance"]["inputs"][1]["file"], "arm.urdf");
     // The shipped numbers under another name give the shipped results.
-    let shipped = bench.run(&["run", "s.toml", "--engine", "rapier", "--json"]);
+    let shipped = bench.run("run s.toml --engine rapier --json");
     let shipped = shipped.json();
     assert_eq!(
         configurations(&report)[0]["engines"],
@@ -451,9 +385,8 @@ fn reader_that_stops_reading_changes_neither_status_nor_files() {
         "max_peak_torque_ratio = 0.01",
     );
     let bench = Bench::with_scenario(&text);
-    for more in [&["--json"][..], &[]] {
-        let mut arguments = vec!["run", "s.toml", "--engine", "rapier", "--junit", "j.xml"];
-        arguments.extend(more);
+    for more in ["--json", ""] {
+        let arguments = format!("run s.toml --engine rapier --junit j.xml {more}");
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
         let status = bench.command(&arguments).stdout(writer).status().unwrap();
@@ -466,8 +399,8 @@ fn reader_that_stops_reading_changes_neither_status_nor_files() {
 #[test]
 fn quiet_run_writes_nothing_to_standard_error() {
     let bench = Bench::with_scenario(SMALL);
-    let run = ["run", "s.toml", "--engine", "rapier"];
-    let quiet = [&run[..], &["--quiet"]].concat();
+    let run = "run s.toml --engine rapier";
+    let quiet = format!("{run} --quiet");
     assert_eq!(bench.run(&quiet).exits_with(0).stderr, "");
     // As does a job that has switched progress off.
     let off = [("NEEDLEBENCH_PROGRESS", Some("off"))];

@@ -5,7 +5,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::support::{Bench, workspace};
+use crate::support::{Bench, Json, workspace};
 
 /// Formats and their committed schemas.
 const FILES: [(&str, &str); 2] = [
@@ -14,7 +14,7 @@ const FILES: [(&str, &str); 2] = [
 ];
 
 fn printed(format: &str) -> String {
-    let answer = Bench::new().run(&["schema", format]);
+    let answer = Bench::new().run(format!("schema {format}"));
     answer.exits_with(0).stdout
 }
 
@@ -73,10 +73,7 @@ fn keys(schema: &Value) -> BTreeMap<String, Value> {
             .into_iter()
             .flatten()
         {
-            found.insert(
-                format!("{path} needs {}", required.as_str().unwrap()),
-                Value::Null,
-            );
+            found.insert(format!("{path} needs {}", required.word()), Value::Null);
         }
         for (key, property) in object
             .get("properties")
@@ -192,7 +189,7 @@ fn a_file_that_a_released_schema_takes_is_taken_as_long_as_the_version_stands() 
     let changelog = fs::read_to_string(workspace().join("CHANGELOG.md")).unwrap();
     for format in ["scenario", "study", "arm"] {
         let now: Value = serde_json::from_str(&printed(format)).unwrap();
-        let id = now["$id"].as_str().unwrap();
+        let id = now["$id"].word();
         let version = id.strip_prefix(&format!("urn:needlebench:schema:{format}:"));
         let version: u32 = version.unwrap().parse().unwrap();
         let file = workspace().join(format!("tests/schema/released/{format}.{version}.json"));

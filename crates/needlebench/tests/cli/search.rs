@@ -1,6 +1,8 @@
 //! `search`: from a study file to the best choice, whatever happens on the way.
 
-use crate::support::{Answer, Bench, has_keys};
+use std::fmt::Display;
+
+use crate::support::{Answer, Bench, Json, has_keys, holds};
 
 /// Three heights and two mounts of the tool.
 const STUDY: &str = r#"
@@ -29,10 +31,8 @@ role = "choice"
 values = [90, 180]
 "#;
 
-fn run(bench: &Bench, more: &[&str]) -> Answer {
-    let mut arguments = vec!["search", "study.toml", "--quiet"];
-    arguments.extend(more);
-    bench.run(&arguments)
+fn run(bench: &Bench, more: impl Display) -> Answer {
+    bench.run(format!("search study.toml --quiet {more}"))
 }
 
 /// All that a search has written, without parts of generations.
@@ -51,16 +51,10 @@ fn written(bench: &Bench, folder: &str) -> Vec<(String, Vec<u8>)> {
 #[test]
 fn the_answer_has_figures_of_layouts_that_nothing_was_compared_by() {
     let bench = Bench::with_study(STUDY);
-    let document = run(&bench, &["--json"]).exits_with(0).json();
+    let document = run(&bench, "--json").exits_with(0).json();
     has_keys(
         &document,
-        &[
-            "schema_version",
-            "study_id",
-            "answer",
-            "candidates",
-            "generations",
-        ],
+        "schema_version study_id answer candidates generations",
     );
     let answer = &document["answer"];
     assert_eq!(answer["figures"][0]["cases"], 16);
@@ -76,10 +70,10 @@ fn the_answer_has_figures_of_layouts_that_nothing_was_compared_by() {
             .path("out/best/search/gen_000/results.parquet")
             .exists()
     );
-    let again = run(&bench, &[]).exits_with(2);
+    let again = run(&bench, "").exits_with(2);
     again.complains(["--resume"]);
-    let text = run(&bench, &["--resume"]).exits_with(0).stdout;
-    assert!(text.contains("best") && text.contains("works"), "{text}");
+    let text = run(&bench, "--resume").exits_with(0).stdout;
+    holds(&text, ["best", "works"]);
     assert!(
         text.lines().all(|line| line.chars().count() <= 100),
         "{text}"
@@ -89,27 +83,29 @@ fn the_answer_has_figures_of_layouts_that_nothing_was_compared_by() {
 #[test]
 fn threads_shards_and_breaks_give_the_same_bytes() {
     let whole = Bench::with_study(STUDY);
-    run(&whole, &["--jobs", "1"]).exits_with(0);
+    run(&whole, "--jobs 1").exits_with(0);
     let expected = written(&whole, "out/best");
 
     let threads = Bench::with_study(STUDY);
-    run(&threads, &["--jobs", "3"]).exits_with(0);
+    run(&threads, "--jobs 3").exits_with(0);
     assert!(written(&threads, "out/best") == expected);
 
     // Parts of every generation, then a search that joins them.
     let shards = Bench::with_study(STUDY);
     for shard in ["2/2", "1/2"] {
-        let said = run(&shards, &["--shard", shard]).exits_with(0).stdout;
+        let said = run(&shards, format!("--shard {shard}"))
+            .exits_with(0)
+            .stdout;
         assert!(said.contains("generation 0"), "{said}");
     }
-    run(&shards, &["--resume"]).exits_with(0);
+    run(&shards, "--resume").exits_with(0);
     assert!(written(&shards, "out/best") == expected);
 
     // As after a kill: a generation that has begun, and a log that is behind.
     let broken = Bench::with_study(STUDY);
-    run(&broken, &["--shard", "1/2"]).exits_with(0);
+    run(&broken, "--shard 1/2").exits_with(0);
     broken.write("out/best/search.json", "{");
-    run(&broken, &["--resume"]).exits_with(0);
+    run(&broken, "--resume").exits_with(0);
     assert!(written(&broken, "out/best") == expected);
 }
 
@@ -118,7 +114,7 @@ fn a_study_of_a_choice_with_a_range_names_the_search() {
     let bench = Bench::with_study("");
     let ranges = STUDY.replace("values = [790, 800, 810]", "range = [790, 810]");
     bench.write("study.toml", ranges);
-    let study = bench.run(&["study", "study.toml", "--quiet"]).exits_with(0);
+    let study = bench.run("study study.toml --quiet").exits_with(0);
     study.complains(["height", "needlebench search"]);
 }
 
@@ -126,8 +122,8 @@ fn a_study_of_a_choice_with_a_range_names_the_search() {
 fn the_error_of_the_tip_is_that_of_real_arms() {
     let by_error = STUDY.replace("fresh = 16", "fresh = 16\nobjective = \"tip_error\"");
     let bench = Bench::with_study(&by_error);
-    let document = run(&bench, &["--json"]).exits_with(0).json();
-    let error_mm = document["answer"]["figures"][0]["value"].as_f64().unwrap();
+    let document = run(&bench, "--json").exits_with(0).json();
+    let error_mm = document["answer"]["figures"][0]["value"].number();
     // Without a criterion on it, too. A perfect arm's is below a micrometre, and what does not work counts 10 mm.
     assert!((0.3..9.0).contains(&error_mm), "{error_mm}");
 }
@@ -135,8 +131,8 @@ fn the_error_of_the_tip_is_that_of_real_arms() {
 #[test]
 fn of_a_generation_with_fewer_blocks_than_parts_the_last_ones_have_nothing() {
     let bench = Bench::with_study(STUDY);
-    let answer = run(&bench, &["--shard", "200/256"]).exits_with(0);
-    assert!(answer.stdout.contains("nothing to do"), "{}", answer.stdout);
-    let own = run(&bench, &["--shard", "1/256"]).exits_with(0);
-    assert!(own.stdout.contains("part 1/24"), "{}", own.stdout);
+    let answer = run(&bench, "--shard 200/256").exits_with(0);
+    answer.says(["nothing to do"]);
+    let own = run(&bench, "--shard 1/256").exits_with(0);
+    own.says(["part 1/24"]);
 }

@@ -1,8 +1,10 @@
 //! `study` and `merge`: from a study file to a folder of results.
 
+use std::fmt::Display;
+
 use serde_json::Value;
 
-use crate::support::{Bench, has_keys, workspace};
+use crate::support::{Bench, Json, has_keys, holds, workspace};
 
 /// 96 static cases.
 const STUDY: &str = r#"
@@ -29,19 +31,15 @@ key = "tool.mount_rotation_deg"
 values = [90, 180]
 "#;
 
-fn run(bench: &Bench, more: &[&str]) -> crate::support::Answer {
-    let mut arguments = vec!["study", "study.toml", "--quiet"];
-    arguments.extend(more);
-    bench.run(&arguments)
+fn run(bench: &Bench, more: impl Display) -> crate::support::Answer {
+    bench.run(format!("study study.toml --quiet {more}"))
 }
 
 #[test]
 fn a_study_leaves_a_table_a_summary_and_a_page() {
     let bench = Bench::with_study(STUDY);
-    let answer = run(&bench, &["--csv", "--junit", "junit.xml"]).exits_with(0);
-    for word in ["96 cases", "Right-Up-Fold", "height"] {
-        assert!(answer.stdout.contains(word), "{}", answer.stdout);
-    }
+    let answer = run(&bench, "--csv --junit junit.xml").exits_with(0);
+    answer.says(["96 cases", "Right-Up-Fold", "height"]);
     for file in [
         "results.parquet",
         "results.csv",
@@ -56,9 +54,7 @@ fn a_study_leaves_a_table_a_summary_and_a_page() {
     let summary: Value = serde_json::from_slice(&bench.read("out/moved/summary.json")).unwrap();
     has_keys(
         &summary,
-        &[
-            "name", "cases", "verdict", "criteria", "overall", "effects", "choices", "study_id",
-        ],
+        "name cases verdict criteria overall effects choices study_id",
     );
     assert_eq!(summary["cases"], 96);
 }
@@ -66,18 +62,18 @@ fn a_study_leaves_a_table_a_summary_and_a_page() {
 #[test]
 fn a_study_of_postures_says_so_everywhere_and_what_they_overstate() {
     let bench = Bench::with_study(&format!("{STUDY}[criteria]\nmin_layouts_working = 0.0\n"));
-    let answer = run(&bench, &["--junit", "junit.xml"]).exits_with(0);
+    let answer = run(&bench, "--junit junit.xml").exits_with(0);
     let warned = answer
         .stdout
         .lines()
         .position(|line| line.starts_with("POSTURES only: "));
     assert!(warned.is_some_and(|line| line < 8), "{}", answer.stdout);
-    let markdown = String::from_utf8(bench.read("out/moved/summary.md")).unwrap();
+    let markdown = bench.text("out/moved/summary.md");
     assert!(markdown.starts_with("# moved (postures only): pass\n\n"));
     assert!(markdown.find("- POSTURES only: ") < markdown.find("| choice"));
     let summary: Value = serde_json::from_slice(&bench.read("out/moved/summary.json")).unwrap();
     assert_eq!(summary["postures_only"], "all");
-    let headline = summary["headline"].as_str().unwrap();
+    let headline = summary["headline"].word();
     assert!(
         headline.starts_with("postures only: ") && headline.contains("Of 4 cases"),
         "{headline}"
@@ -85,8 +81,8 @@ fn a_study_of_postures_says_so_everywhere_and_what_they_overstate() {
     // Of the best choice alone, which has a third of the cases.
     assert_eq!(summary["replanned"]["cases"], 4);
     assert!(summary["replanned"]["of"].as_u64().unwrap() <= 32);
-    let drawn = summary["replanned"]["drawn"].as_array().unwrap();
-    for of in summary["replanned"]["gaps"].as_array().unwrap() {
+    let drawn = summary["replanned"]["drawn"].list();
+    for of in summary["replanned"]["gaps"].list() {
         assert!(of["interval"]["low"].is_number(), "{of}");
     }
     // A case that was drawn has the postures of its rows, and the motions of the case planned by itself.
@@ -94,19 +90,20 @@ fn a_study_of_postures_says_so_everywhere_and_what_they_overstate() {
     let bits = |mode: &str| {
         bench.write("alone.toml", STUDY.replace("mode = \"static\"", mode));
         let number = case["case"].to_string();
-        let arguments = ["study", "alone.toml", "--case", &number, "--json"];
+        let arguments = format!("study alone.toml --case {number} --json");
         let alone = bench.run(&arguments).exits_with(0).json();
-        let rows = alone["rows"].as_array().unwrap().iter().enumerate();
+        let rows = alone["rows"].list().iter().enumerate();
         let ok = rows.filter(|(_, row)| row["outcome"] == "ok");
         ok.fold(0_u64, |bits, (index, _)| bits | 1 << index)
     };
     assert_eq!(case["static"], bits("mode = \"static\""));
     assert_eq!(case["planned"], bits("mode = \"planned\""));
-    let junit = String::from_utf8(bench.read("junit.xml")).unwrap();
-    for words in ["postures only: ", "name=\"choice\"", "best of 3 choices"] {
-        assert!(junit.contains(words), "{junit}");
-    }
-    let page = String::from_utf8(bench.read("out/moved/report.html")).unwrap();
+    let junit = bench.text("junit.xml");
+    holds(
+        &junit,
+        ["postures only: ", "name=\"choice\"", "best of 3 choices"],
+    );
+    let page = bench.text("out/moved/report.html");
     assert!(page.contains("summary.headline"));
 }
 
@@ -118,7 +115,7 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
     let bench = Bench::with_study(&format!(
         "{STUDY}[criteria]\nmin_layouts_working = 0.0\n[requirements]\nmin_layouts_working = \"SRS-1\"\n"
     ));
-    let arguments = ["study", "study.toml", "--quiet", "--no-page"];
+    let arguments = "study study.toml --quiet --no-page";
     let answer = bench
         .run_with(&[("COLUMNS", Some("80"))], &arguments)
         .exits_with(0);
@@ -135,18 +132,14 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
     }
     // The figure stands with its interval.
     let summary: Value = serde_json::from_slice(&bench.read("out/moved/summary.json")).unwrap();
-    let sentence = summary["answer"]["sentence"].as_str().unwrap();
-    let label = summary["choices"]["choices"][0]["label"].as_str().unwrap();
+    let sentence = summary["answer"]["sentence"].word();
+    let label = summary["choices"]["choices"][0]["label"].word();
     // Half of the cases cannot exist: the pose is the flange's, and a turned tool misses the patient.
-    assert!(
-        answer
-            .stdout
-            .contains("16 of 32 cases are layouts that cannot exist")
-    );
+    answer.says(["16 of 32 cases are layouts that cannot exist"]);
     for words in [label, "95 % interval", " % of 16 layouts"] {
         assert!(sentence.contains(words), "{sentence}");
     }
-    let markdown = String::from_utf8(bench.read("out/moved/summary.md")).unwrap();
+    let markdown = bench.text("out/moved/summary.md");
     let at = |words: &str| {
         markdown
             .find(words)
@@ -157,7 +150,7 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
     assert!(at("SRS-1") < at("<details>"));
     // A choice of what is drawn exactly has no tip error to show.
     assert!(!answer.stdout.contains("tip error"), "{}", answer.stdout);
-    let all = run(&bench, &["--no-page", "--resume", "--wide"])
+    let all = run(&bench, "--no-page --resume --wide")
         .exits_with(0)
         .stdout;
     for words in [
@@ -182,33 +175,30 @@ fn named_levels_are_held_against_each_other_where_nothing_is_to_be_chosen() {
         "key = \"phantom.position_mm[0]\"\nrange = [-20, 20]\nrelative = true",
         "key = \"phantom.head_yaw_deg\"\nrange = [-5, 5]\nrelative = true",
     ));
-    run(&bench, &["--no-page"]).exits_with(0);
+    run(&bench, "--no-page").exits_with(0);
     let summary: Value = serde_json::from_slice(&bench.read("out/moved/summary.json")).unwrap();
-    let compared = summary["answer"]["compared"].as_array().unwrap();
+    let compared = summary["answer"]["compared"].list();
     // Heights are numbers, a range and no question.
     assert_eq!(compared.len(), 1, "{compared:?}");
     assert_eq!(compared[0]["factor"], "tool");
     assert_eq!(compared[0]["differs"], true);
     assert_eq!(compared[0]["levels"][1]["value"], 0.0);
-    let sentence = summary["answer"]["sentence"].as_str().unwrap();
-    assert!(
-        sentence.contains("layouts that work by tool: ") && sentence.contains("0.0 % (0.0 to"),
-        "{sentence}"
-    );
+    let sentence = summary["answer"]["sentence"].word();
+    holds(&sentence, ["layouts that work by tool: ", "0.0 % (0.0 to"]);
 }
 
 #[test]
 fn what_was_planned_for_the_gap_is_not_planned_again() {
     let bench = Bench::with_study(STUDY);
-    run(&bench, &["--no-page"]).exits_with(0);
+    run(&bench, "--no-page").exits_with(0);
     let whole = bench.read("out/moved/summary.json");
-    let kept = String::from_utf8(bench.read("out/moved/replanned.txt")).unwrap();
+    let kept = bench.text("out/moved/replanned.txt");
     // Damage is seen, and made good.
     bench.write(
         "out/moved/replanned.txt",
         kept.replacen("\nstudy", "\nStudy", 1),
     );
-    run(&bench, &["--no-page", "--resume"]).exits_with(0);
+    run(&bench, "--no-page --resume").exits_with(0);
     assert_eq!(bench.read("out/moved/summary.json"), whole);
     assert_eq!(bench.read("out/moved/replanned.txt"), kept.as_bytes());
 }
@@ -216,15 +206,15 @@ fn what_was_planned_for_the_gap_is_not_planned_again() {
 #[test]
 fn a_case_alone_has_the_numbers_of_its_rows() {
     let bench = Bench::with_study(STUDY);
-    run(&bench, &["--csv", "--no-page"]).exits_with(0);
-    let table = String::from_utf8(bench.read("out/moved/results.csv")).unwrap();
+    run(&bench, "--csv --no-page").exits_with(0);
+    let table = bench.text("out/moved/results.csv");
     let mut lines = table.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len(), 8 * 96);
     let mut compared = 0;
     for case in [0, 41, 95] {
-        let alone = run(&bench, &["--case", &case.to_string(), "--json"])
+        let alone = run(&bench, format!("--case {case} --json"))
             .exits_with(0)
             .json();
         let of_case: Vec<_> = rows
@@ -232,7 +222,7 @@ fn a_case_alone_has_the_numbers_of_its_rows() {
             .filter(|row| row[0] == case.to_string())
             .collect();
         assert_eq!(of_case.len(), 8);
-        for (row, alone) in of_case.iter().zip(alone["rows"].as_array().unwrap()) {
+        for (row, alone) in of_case.iter().zip(alone["rows"].list()) {
             let cell = |name: &str| row[names.iter().position(|each| *each == name).unwrap()];
             assert_eq!(cell("configuration"), alone["configuration"]);
             assert_eq!(cell("outcome"), alone["outcome"]);
@@ -240,7 +230,7 @@ fn a_case_alone_has_the_numbers_of_its_rows() {
             compared += metrics.len();
             for (name, value) in metrics {
                 // Both are the shortest digits of the same 24-bit number.
-                let value = value.as_f64().unwrap();
+                let value = value.number();
                 #[expect(clippy::cast_possible_truncation, reason = "as columns have it")]
                 let value = value as f32;
                 assert_eq!(
@@ -257,28 +247,21 @@ fn a_case_alone_has_the_numbers_of_its_rows() {
 #[test]
 fn shards_on_any_number_of_threads_merge_into_the_same_bytes() {
     let bench = Bench::with_study(STUDY);
-    run(&bench, &["--jobs", "2"]).exits_with(0);
+    run(&bench, "--jobs 2").exits_with(0);
     let whole: Vec<Vec<u8>> = ["results.parquet", "summary.json", "report.html"]
         .map(|file| bench.read(&format!("out/moved/{file}")))
         .into();
-    let mut arguments = vec![
-        "merge".to_owned(),
-        "study.toml".to_owned(),
-        "--out".to_owned(),
-        "merged".to_owned(),
-    ];
+    let mut merge = "merge study.toml --out merged".to_owned();
     for k in 1..=3 {
         let (shard, out) = (format!("{k}/3"), format!("shard{k}"));
-        run(&bench, &["--shard", &shard, "--out", &out, "--jobs", "1"]).exits_with(0);
+        run(&bench, format!("--shard {shard} --out {out} --jobs 1")).exits_with(0);
         if k == 3 {
             // Not all of it is there yet.
-            let early: Vec<&str> = arguments.iter().map(String::as_str).collect();
-            bench.run(&early).exits_with(2).complains(["missing"]);
+            bench.run(&merge).exits_with(2).complains(["missing"]);
         }
-        arguments.push(format!("{out}/moved"));
+        merge += &format!(" {out}/moved");
     }
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    bench.run(&arguments).exits_with(0);
+    bench.run(&merge).exits_with(0);
     for (file, bytes) in ["results.parquet", "summary.json", "report.html"]
         .into_iter()
         .zip(&whole)
@@ -294,12 +277,10 @@ fn shards_on_any_number_of_threads_merge_into_the_same_bytes() {
 fn results_do_not_depend_on_how_the_study_was_called() {
     let bench = Bench::with_study(STUDY);
     let absolute = bench.path("study.toml").display().to_string();
-    let all = ["--quiet", "--csv", "--out"];
+    let all = "--quiet --csv --out";
+    bench.run(format!("study study.toml {all} a")).exits_with(0);
     bench
-        .run(&[&["study", "study.toml"][..], &all, &["a"]].concat())
-        .exits_with(0);
-    bench
-        .run(&[&["study", &absolute][..], &all, &["b"]].concat())
+        .run(format!("study '{absolute}' {all} b"))
         .exits_with(0);
     let files = [
         "replanned.txt",
@@ -320,23 +301,23 @@ fn results_do_not_depend_on_how_the_study_was_called() {
 #[test]
 fn a_folder_with_results_is_neither_overwritten_nor_mixed() {
     let bench = Bench::with_study(STUDY);
-    run(&bench, &["--no-page"]).exits_with(0);
+    run(&bench, "--no-page").exits_with(0);
     let table = bench.read("out/moved/results.parquet");
-    run(&bench, &[]).exits_with(2).complains(["--resume"]);
-    run(&bench, &["--resume"]).exits_with(0);
+    run(&bench, "").exits_with(2).complains(["--resume"]);
+    run(&bench, "--resume").exits_with(0);
     bench.write("study.toml", STUDY.replace("samples = 16", "samples = 8"));
-    run(&bench, &["--resume"])
+    run(&bench, "--resume")
         .exits_with(2)
         .complains(["another study", "different"]);
     assert!(bench.read("out/moved/results.parquet") == table);
     // A table that is cut off is found, and made whole again on request.
     bench.write("study.toml", STUDY);
     bench.write("out/moved/results.parquet", &table[..table.len() / 2]);
-    let compared = bench.run(&["compare", "out/moved", "out/moved"]);
+    let compared = bench.run("compare out/moved out/moved");
     compared
         .exits_with(2)
         .complains(["results.parquet", "--resume"]);
-    let answer = run(&bench, &["--resume"]).exits_with(0);
+    let answer = run(&bench, "--resume").exits_with(0);
     answer.complains(["results.parquet: is cut off", "computed again"]);
     assert!(bench.read("out/moved/results.parquet") == table);
 }
@@ -346,13 +327,10 @@ fn a_missed_criterion_of_a_study_is_a_failure() {
     let bench = Bench::with_study(&format!(
         "{STUDY}[criteria]\nmin_layouts_working = 1.0\nmin_clearance_mm = {{ at_least = 500 }}\n"
     ));
-    let answer = run(&bench, &["--junit", "junit.xml", "--json", "--no-page"]).exits_with(1);
+    let answer = run(&bench, "--junit junit.xml --json --no-page").exits_with(1);
     assert_eq!(answer.json()["verdict"], "fail");
-    let junit = String::from_utf8(bench.read("junit.xml")).unwrap();
-    assert!(
-        junit.contains("min_clearance_mm") && junit.contains("<failure"),
-        "{junit}"
-    );
+    let junit = bench.text("junit.xml");
+    holds(&junit, ["min_clearance_mm", "<failure"]);
 }
 
 #[test]
@@ -363,7 +341,7 @@ fn a_case_is_run_with_everything_that_a_run_leaves() {
         "mode = \"dynamic\"\nengines = [\"rapier\"]",
     );
     bench.write("study.toml", study);
-    let answer = run(&bench, &["--case", "7", "--run"]);
+    let answer = run(&bench, "--case 7 --run");
     assert!(matches!(answer.status, Some(0 | 1)), "{answer:#?}");
     for file in ["report.json", "report.html"] {
         assert!(
@@ -379,9 +357,9 @@ fn shipped_studies_are_understood() {
         let file = workspace().join(format!("scenarios/studies/{name}.toml"));
         let bench = Bench::new();
         let answer = bench
-            .run(&["study", file.to_str().unwrap(), "--case", "0", "--json"])
+            .run(format!("study '{}' --case 0 --json", file.display()))
             .exits_with(0)
             .json();
-        assert_eq!(answer["rows"].as_array().unwrap().len(), 8, "{name}");
+        assert_eq!(answer["rows"].list().len(), 8, "{name}");
     }
 }

@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::support::{Bench, numbers, workspace};
+use crate::support::{Bench, Json, holds, numbers, workspace};
 
 /// A patient, a table, a robot beside it, and a lesion: all else is left out.
 const SHORT: &str =
@@ -15,21 +15,13 @@ fn suite() -> String {
 }
 
 fn entries(answer: &Value) -> &Vec<Value> {
-    answer["entries"][0]["entries"].as_array().unwrap()
+    answer["entries"][0]["entries"].list()
 }
 
 #[test]
 fn proposed_entries_lie_on_the_skin_and_pass_check() {
     let bench = Bench::with_scenario(&suite());
-    let arguments = [
-        "suggest",
-        "s.toml",
-        "--goal",
-        "right_upper_anterior",
-        "--places",
-        "0",
-        "--json",
-    ];
+    let arguments = "suggest s.toml --goal right_upper_anterior --places 0 --json";
     let answer = bench.run(&arguments).exits_with(0).json();
     assert_eq!(entries(&answer).len(), 3);
     for entry in entries(&answer) {
@@ -44,24 +36,17 @@ fn proposed_entries_lie_on_the_skin_and_pass_check() {
         for line in [by_direction, by_point] {
             let text = suite().replace("entry_mm = [-108.9, -76.4, 85.8]", &line);
             bench.write("with.toml", text);
-            let check = bench
-                .run(&["check", "with.toml", "--json"])
-                .exits_with(0)
-                .json();
+            let check = bench.run("check with.toml --json").exits_with(0).json();
             let goal = &check["scenarios"][0]["goals"][0];
             assert_eq!(goal["name"], "right_upper_anterior");
             assert_eq!(goal["working"], entry["working"]);
             assert_eq!(goal["needle_route"]["kept"], true);
-            let moved = check["notes"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .filter_map(Value::as_str);
+            let moved = check["notes"].list().iter().filter_map(Value::as_str);
             let moved = moved
                 .filter(|note| note.contains("right_upper_anterior") && note.contains("moved"));
             assert_eq!(moved.count(), 0, "the entry is not on the skin");
         }
-        let depth = entry["depth_m"].as_f64().unwrap();
+        let depth = entry["depth_m"].number();
         let target = numbers(&answer["entries"][0]["target_in_phantom_m"]);
         let apart: f64 = point
             .iter()
@@ -73,7 +58,7 @@ fn proposed_entries_lie_on_the_skin_and_pass_check() {
     // The best is first.
     let scores: Vec<f64> = entries(&answer)
         .iter()
-        .map(|each| each["score"].as_f64().unwrap())
+        .map(|each| each["score"].number())
         .collect();
     assert!(scores.is_sorted_by(|a, b| a >= b), "{scores:?}");
 }
@@ -81,33 +66,22 @@ fn proposed_entries_lie_on_the_skin_and_pass_check() {
 #[test]
 fn proposed_places_pass_check_for_all_goals() {
     let bench = Bench::with_scenario(&suite());
-    let arguments = [
-        "suggest",
-        "s.toml",
-        "--entries",
-        "0",
-        "--places",
-        "2",
-        "--json",
-    ];
+    let arguments = "suggest s.toml --entries 0 --places 2 --json";
     let answer = bench.run(&arguments).exits_with(0).json();
-    let places = answer["places"]["places"].as_array().unwrap();
+    let places = answer["places"]["places"].list();
     assert_eq!(places.len(), 2);
     for place in places {
-        let lines = place["toml"].as_str().unwrap();
+        let lines = place["toml"].word();
         let old = "base_position_mm = [-280, 350, 1050]\nbase_rpy_deg = [0, 0, 270]";
         assert!(suite().contains(old));
         bench.write("with.toml", suite().replace(old, lines));
-        let check = bench
-            .run(&["check", "with.toml", "--json"])
-            .exits_with(0)
-            .json();
-        let goals = check["scenarios"][0]["goals"].as_array().unwrap();
+        let check = bench.run("check with.toml --json").exits_with(0).json();
+        let goals = check["scenarios"][0]["goals"].list();
         let working: Vec<u64> = goals
             .iter()
             .map(|goal| goal["working"].as_u64().unwrap())
             .collect();
-        let proposed = place["goals"].as_array().unwrap();
+        let proposed = place["goals"].list();
         let proposed: Vec<u64> = proposed
             .iter()
             .map(|goal| goal["working"].as_u64().unwrap())
@@ -121,9 +95,7 @@ fn proposed_places_pass_check_for_all_goals() {
 fn answers_do_not_depend_on_threads() {
     let bench = Bench::with_scenario(SHORT);
     let ask = |jobs: &str| {
-        let arguments = [
-            "suggest", "s.toml", "--places", "1", "--json", "--jobs", jobs,
-        ];
+        let arguments = format!("suggest s.toml --places 1 --json --jobs {jobs}");
         bench.run(&arguments).exits_with(0).stdout
     };
     assert_eq!(ask("1"), ask("3"));
@@ -132,26 +104,16 @@ fn answers_do_not_depend_on_threads() {
 #[test]
 fn a_scenario_is_written_that_passes_check_and_keeps_its_comments() {
     let bench = Bench::with_scenario(&suite());
-    let arguments = [
-        "suggest",
-        "s.toml",
-        "--lesion",
-        "left_lower_lobe",
-        "--places",
-        "1",
-        "--write",
-        "new.toml",
-        "--out",
-        "maps",
-    ];
+    let arguments =
+        "suggest s.toml --lesion left_lower_lobe --places 1 --write new.toml --out maps";
     let said = bench.run(&arguments).exits_with(0).stdout;
     assert!(said.contains("next: needlebench run new.toml"), "{said}");
-    let text = String::from_utf8(bench.read("new.toml")).unwrap();
+    let text = bench.text("new.toml");
     assert!(text.contains("name = \"new\""), "{text}");
     assert!(said.contains(" rib") && !said.contains("rib_"), "{said}");
-    assert!(
-        text.contains("# Driven out of the bore") && text.contains("lesion = \"left_lower_lobe\""),
-        "{text}"
+    holds(
+        &text,
+        ["# Driven out of the bore", "lesion = \"left_lower_lobe\""],
     );
     for name in [
         "left_lower_lobe.entries.png",
@@ -174,21 +136,9 @@ fn a_scenario_is_written_that_passes_check_and_keeps_its_comments() {
 fn where_there_is_no_entry_it_says_which_rule_refuses_most() {
     let short = suite().replace("needle_length_mm = 200", "needle_length_mm = 70");
     let bench = Bench::with_scenario(&short);
-    let arguments = [
-        "suggest",
-        "s.toml",
-        "--lesion",
-        "left_lower_lobe",
-        "--entries",
-        "1",
-        "--places",
-        "0",
-    ];
+    let arguments = "suggest s.toml --lesion left_lower_lobe --entries 1 --places 0";
     let said = bench.run(&arguments).exits_with(1).stdout;
-    assert!(
-        said.contains("none: of") && said.contains("most often: needle too short"),
-        "{said}"
-    );
+    holds(&said, ["none: of", "most often: needle too short"]);
 }
 
 /// Half an hour in a debug build.
@@ -196,19 +146,14 @@ fn where_there_is_no_entry_it_says_which_rule_refuses_most() {
 #[ignore = "long: every shipped phantom and lesion"]
 fn proposals_for_every_phantom_and_lesion_pass_check() {
     let bench = Bench::new();
-    let choices = bench
-        .run(&["init", "--list", "--json"])
-        .exits_with(0)
-        .json();
+    let choices = bench.run("init --list --json").exits_with(0).json();
     let (mut proposed, mut none) = (0, 0);
-    for phantom in choices["phantoms"].as_array().unwrap() {
-        for lesion in choices["lesions"].as_array().unwrap() {
-            let [phantom, lesion] = [phantom, &lesion["name"]].map(|each| each.as_str().unwrap());
+    for phantom in choices["phantoms"].list() {
+        for lesion in choices["lesions"].list() {
+            let [phantom, lesion] = [phantom, &lesion["name"]].map(|each| each.word());
             let text = format!("[phantom]\nmodel = \"{phantom}\"\n");
             bench.write("s.toml", &text);
-            let arguments = [
-                "suggest", "s.toml", "--lesion", lesion, "--places", "0", "--json",
-            ];
+            let arguments = format!("suggest s.toml --lesion {lesion} --places 0 --json");
             let answer = bench.run(&arguments);
             let found = answer.json();
             assert_eq!(
@@ -218,12 +163,12 @@ fn proposals_for_every_phantom_and_lesion_pass_check() {
             );
             none += usize::from(entries(&found).is_empty());
             for entry in entries(&found) {
-                let entry = entry["toml"].as_str().unwrap();
+                let entry = entry["toml"].word();
                 bench.write(
                     "with.toml",
                     format!("{text}[[goals]]\nlesion = \"{lesion}\"\n{entry}\n"),
                 );
-                bench.run(&["check", "with.toml"]).exits_with(0);
+                bench.run("check with.toml").exits_with(0);
                 proposed += 1;
             }
         }

@@ -59,16 +59,36 @@ impl Answer {
         serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:#?}"))
     }
 
+    /// Standard output holds all of these.
+    #[track_caller]
+    pub fn says<const N: usize>(&self, parts: [&str; N]) {
+        holds(&self.stdout, parts);
+    }
+
     /// Standard error holds all of these.
     #[track_caller]
     pub fn complains<const N: usize>(&self, parts: [&str; N]) {
-        for part in parts {
-            assert!(
-                self.stderr.contains(part),
-                "no `{part}` in\n{}",
-                self.stderr
-            );
+        holds(&self.stderr, parts);
+    }
+}
+
+/// What is typed behind the program's name.
+pub trait Arguments {
+    fn words(&self) -> Vec<String>;
+}
+
+/// A line; what stands between `'` is one word.
+impl<S: AsRef<str>> Arguments for S {
+    fn words(&self) -> Vec<String> {
+        let mut words = Vec::new();
+        for (at, part) in self.as_ref().split('\'').enumerate() {
+            if at % 2 == 1 {
+                words.push(part.to_owned());
+            } else {
+                words.extend(part.split_whitespace().map(str::to_owned));
+            }
         }
+        words
     }
 }
 
@@ -111,6 +131,10 @@ impl Bench {
         fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
     }
 
+    pub fn text(&self, name: &str) -> String {
+        String::from_utf8(self.read(name)).unwrap()
+    }
+
     pub fn read_json(&self, name: &str) -> Value {
         serde_json::from_slice(&self.read(name)).unwrap()
     }
@@ -135,10 +159,10 @@ impl Bench {
     }
 
     /// The program in this folder, free of the settings of whoever runs the tests.
-    pub fn command(&self, arguments: &[&str]) -> Command {
+    pub fn command(&self, arguments: impl Arguments) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_needlebench"));
         command
-            .args(arguments)
+            .args(arguments.words())
             .current_dir(self.folder.path())
             .env_remove("CI")
             .env_remove("CLICOLOR_FORCE")
@@ -149,12 +173,16 @@ impl Bench {
         command
     }
 
-    pub fn run(&self, arguments: &[&str]) -> Answer {
+    pub fn run(&self, arguments: impl Arguments) -> Answer {
         Answer::of(self.command(arguments).output().unwrap())
     }
 
     /// With other environment variables; `None` removes one.
-    pub fn run_with(&self, variables: &[(&str, Option<&str>)], arguments: &[&str]) -> Answer {
+    pub fn run_with(
+        &self,
+        variables: &[(&str, Option<&str>)],
+        arguments: impl Arguments,
+    ) -> Answer {
         let mut command = self.command(arguments);
         for (name, value) in variables {
             match value {
@@ -182,8 +210,16 @@ pub fn without_times(junit: &[u8]) -> String {
 #[track_caller]
 pub fn mujoco_is_ready() {
     static READY: OnceLock<Answer> = OnceLock::new();
-    let doctor = READY.get_or_init(|| Bench::new().run(&["doctor", "--json"]));
+    let doctor = READY.get_or_init(|| Bench::new().run("doctor --json"));
     assert_eq!(doctor.status, Some(0), "{doctor:#?}");
+}
+
+/// Asserts that a text holds all of these.
+#[track_caller]
+pub fn holds<const N: usize>(text: &str, parts: [&str; N]) {
+    for part in parts {
+        assert!(text.contains(part), "no `{part}` in\n{text}");
+    }
 }
 
 /// A text with one place changed, which has to be there exactly once.
@@ -193,20 +229,46 @@ pub fn with_edit(text: &str, from: &str, to: &str) -> String {
     text.replace(from, to)
 }
 
-/// Asserts that a JSON object has all of these keys.
+/// What a JSON value has to be.
+pub trait Json {
+    fn list(&self) -> &Vec<Value>;
+    fn number(&self) -> f64;
+    fn word(&self) -> &str;
+}
+
+impl Json for Value {
+    #[track_caller]
+    fn list(&self) -> &Vec<Value> {
+        let list = self.as_array();
+        list.unwrap_or_else(|| panic!("{self} is no list"))
+    }
+
+    #[track_caller]
+    fn number(&self) -> f64 {
+        let number = self.as_f64();
+        number.unwrap_or_else(|| panic!("{self} is no number"))
+    }
+
+    #[track_caller]
+    fn word(&self) -> &str {
+        let word = self.as_str();
+        word.unwrap_or_else(|| panic!("{self} is no text"))
+    }
+}
+
+/// Asserts that a JSON object has all of these keys, with spaces between.
 #[track_caller]
-pub fn has_keys(value: &Value, keys: &[&str]) {
+pub fn has_keys(value: &Value, keys: &str) {
     let object = value
         .as_object()
         .unwrap_or_else(|| panic!("{value} is not an object"));
-    for key in keys {
-        assert!(object.contains_key(*key), "no key `{key}` in {value:#}");
+    for key in keys.split_whitespace() {
+        assert!(object.contains_key(key), "no key `{key}` in {value:#}");
     }
 }
 
 /// A JSON array of numbers.
 #[track_caller]
 pub fn numbers(value: &Value) -> Vec<f64> {
-    let array = value.as_array().unwrap();
-    array.iter().map(|item| item.as_f64().unwrap()).collect()
+    value.list().iter().map(Json::number).collect()
 }
