@@ -1,15 +1,13 @@
 //! Arms by name, by their lengths and by a file of their own.
 
-use crate::support::{Bench, Json, SMALL};
+use crate::support::{Bench, Json, small_run};
 
 /// A scenario that any arm's size suits.
 const ROOMY: &str = include_str!("../cmd/fixtures/roomy.toml");
 
 #[test]
 fn report_has_the_arm_and_the_file_with_its_data() {
-    let bench = Bench::with_scenario(SMALL);
-    let run = "run s.toml --engine rapier --json --no-page --quiet";
-    let report = bench.run(&run).json();
+    let report = small_run().1.json();
     assert_eq!(report["arm"]["arm"], "ur3");
     assert_eq!(report["arm"]["name"], "UR3");
     assert_eq!(report["arm"]["recognition"], "own");

@@ -1,21 +1,15 @@
 //! `compare`: results, folders and scenarios side by side.
 
 use std::fmt::Display;
-use std::sync::OnceLock;
 
 use needlebench_evaluation::metric::{Metric, MetricKey};
 use serde_json::{Value, json};
 
-use crate::support::{Answer, Bench, Json, SMALL, has_keys, holds, with_edit};
+use crate::support::{Answer, Bench, Json, SMALL, has_keys, holds, small_run, with_edit};
 
 /// The report of `SMALL` in rapier, as text.
 fn report() -> &'static str {
-    static REPORT: OnceLock<String> = OnceLock::new();
-    REPORT.get_or_init(|| {
-        let bench = Bench::with_scenario(SMALL);
-        let answer = bench.run("run s.toml --engine rapier --json");
-        answer.exits_with(0).stdout
-    })
+    &small_run().1.stdout
 }
 
 /// A folder with `a.json`, and `b.json` that was changed.

@@ -1,17 +1,25 @@
 //! `needlebench ct routes`, and goals with planned routes.
 
 use std::fs;
+use std::sync::OnceLock;
 
 use crate::support::{Bench, Json, has_keys, holds, numbers, workspace};
 
 /// A chest of coarse pixels with markers that the robot has touched, and the patient made of it.
-fn built() -> Bench {
+fn built() -> &'static Bench {
+    static BUILT: OnceLock<Bench> = OnceLock::new();
+    BUILT.get_or_init(build)
+}
+
+fn build() -> Bench {
     let text = fs::read_to_string(workspace().join("scenarios/supine_suite.toml")).unwrap();
-    let bench = Bench::with_scenario(&text);
+    let bench = Bench::shared();
+    bench.write("s.toml", text);
     let scan =
         "ct synth s.toml --out ct --markers ct-sphere --pixels 300 --preset biopsy --no-labels";
     bench.run(&scan).exits_with(0);
-    let build = "ct build ct/ct.nii.gz --out patient --lesion nodule=-107,10,35 --thickness-mm 2.5 --markers ct/marker_list.toml --room s.toml --no-pictures";
+    let build = "ct build ct/ct.nii.gz --out patient --lesion nodule=-107,10,35 --thickness-mm 2.5 \
+                 --markers ct/marker_list.toml --room s.toml --no-pictures";
     bench.run(&build).exits_with(0);
     bench
 }
@@ -104,7 +112,8 @@ fn what_cannot_be_planned_is_said() {
     fails("ct", "ct build");
     fails("patient --write elsewhere.toml", "beside the scenario");
     // Without markers nobody knows where the robot is: routes by the patient alone, and why.
-    let build = "ct build ct/ct.nii.gz --out unregistered --lesion nodule=-107,10,35 --thickness-mm 2.5 --room s.toml --no-pictures";
+    let build = "ct build ct/ct.nii.gz --out unregistered --lesion nodule=-107,10,35 --thickness-mm 2.5 \
+                 --room s.toml --no-pictures";
     bench.run(&build).exits_with(0);
     let arguments = "ct routes unregistered --directions 1000 --json";
     let found = bench.run(&arguments).exits_with(0).json();
@@ -114,8 +123,8 @@ fn what_cannot_be_planned_is_said() {
         found["targets"][0]["routes"][0]["configurations"],
         serde_json::json!([])
     );
-    fs::remove_file(bench.path("patient/labels.nii.gz")).unwrap();
-    fails("patient", "--no-labels");
+    fs::remove_file(bench.path("unregistered/labels.nii.gz")).unwrap();
+    fails("unregistered", "--no-labels");
 }
 
 #[test]

@@ -1,8 +1,6 @@
 //! The same input gives the same bytes, however many threads work.
 
-use serde_json::Value;
-
-use crate::support::{Bench, SMALL, mujoco_is_ready, with_edit, without_times};
+use crate::support::{Bench, SMALL, mujoco_is_ready, small_run, with_edit, without_times};
 
 /// The text of a report without its only part that may differ.
 fn without_timings(bench: &Bench, folder: &str) -> String {
@@ -47,8 +45,6 @@ fn repeated_runs_write_identical_files_apart_from_the_timings() {
 
 #[test]
 fn printed_report_is_the_written_one() {
-    let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run("run s.toml --engine rapier --json");
-    let printed: Value = answer.exits_with(0).json();
-    assert_eq!(printed, bench.read_json("out/small/report.json"));
+    let (bench, answer) = small_run();
+    assert_eq!(answer.json(), bench.read_json("out/small/report.json"));
 }

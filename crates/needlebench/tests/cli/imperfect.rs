@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Bench, Json, SMALL, mujoco_is_ready, with_edit};
+use crate::support::{Bench, Json, SMALL, mujoco_is_ready, small_run_wide, with_edit};
 
 /// Every block with its defaults, few samples; the criteria of a nominal robot do not hold.
 const BLOCKS: &str = "
@@ -230,11 +230,10 @@ fn the_needle_is_measured_against_the_true_lesion() {
 
 #[test]
 fn goals_without_a_true_lesion_have_no_numbers_of_one() {
-    let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run("run s.toml --engine rapier --out a --wide");
+    let (bench, answer) = small_run_wide();
     assert!(!answer.stdout.contains("true lesion"), "{answer:#?}");
-    let text = bench.text("a/small/report.json");
+    let text = bench.text("out/small/report.json");
     assert!(!text.contains("true_target") && !text.contains("\"basis\""));
-    let summary = bench.text("a/small/summary.md");
+    let summary = bench.text("out/small/summary.md");
     assert!(!summary.contains("true lesion"));
 }

@@ -37,7 +37,8 @@ fn every_variant_passes_check_or_is_refused() {
                 for lesion in choices["lesions"].list() {
                     let [phantom, lesion] = [phantom, &lesion["name"]].map(|each| each.word());
                     let arguments = format!(
-                        "init v.toml --force --from {template} --arm {arm} --phantom {phantom} --lesion {lesion}"
+                        "init v.toml --force --from {template} --arm {arm} --phantom {phantom} \
+                         --lesion {lesion}"
                     );
                     let answer = bench.run(&arguments);
                     if answer.status == Some(1) {

@@ -1,6 +1,6 @@
 //! The pages of `run` and `atlas`.
 
-use crate::support::{Bench, SMALL, with_edit};
+use crate::support::{Bench, SMALL, small_run, with_edit};
 
 /// Largest page of a run.
 const MOST_BYTES: usize = 3_000_000;
@@ -11,9 +11,7 @@ fn page(bench: &Bench, name: &str) -> String {
 
 #[test]
 fn a_run_leaves_one_small_file_that_needs_no_other() {
-    let bench = Bench::with_scenario(SMALL);
-    bench.run("run s.toml --engine rapier").exits_with(0);
-    let html = page(&bench, "out/small/report.html");
+    let html = page(&small_run().0, "out/small/report.html");
     assert!(html.len() < MOST_BYTES, "{} bytes", html.len());
     assert!(html.contains("<title>run: small - needlebench</title>"));
     assert!(html.contains("default-src 'none'"));

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Bench, Json, SMALL, with_edit};
+use crate::support::{Bench, Json, SMALL, small_run_wide, with_edit};
 
 /// `SMALL` with people.
 fn with_people(people: &str) -> String {
@@ -37,9 +37,8 @@ fn room_is_reported_for_every_posture_with_people_or_without() {
         assert_eq!(room["elbow_as_preferred"], room["elbow_up"]);
     }
 
-    let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run("run s.toml --engine rapier --wide");
-    assert!(answer.exits_with(0).stdout.contains("room for people"));
+    let (bench, answer) = small_run_wide();
+    answer.says(["room for people"]);
     let report = bench.read_json("out/small/report.json");
     for room in rooms(&report) {
         // The default: a doctor in three statures, across the patient from the robot.

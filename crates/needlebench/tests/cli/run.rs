@@ -5,7 +5,9 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::support::{Bench, Json, SMALL, has_keys, holds, mujoco_is_ready, numbers, with_edit};
+use crate::support::{
+    Bench, Json, SMALL, has_keys, holds, mujoco_is_ready, numbers, small_run, with_edit,
+};
 
 /// The report of `SMALL` in both engines.
 fn report() -> &'static Value {
@@ -202,10 +204,9 @@ fn results_folder_holds_what_the_report_lists() {
 
 #[test]
 fn recording_has_a_row_per_period_and_a_number_in_every_column() {
-    let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run("run s.toml --engine rapier");
-    answer.exits_with(0);
-    let bytes = bench.read("out/small/pose/Right-Up-Fold.rapier.csv");
+    let bytes = small_run()
+        .0
+        .read("out/small/pose/Right-Up-Fold.rapier.csv");
     let text = String::from_utf8(bytes).unwrap();
     let mut lines = text.lines();
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -298,9 +299,13 @@ fn rejection_that_was_expected_exits_with_0() {
 fn chosen_engine_is_the_only_one_that_runs() {
     mujoco_is_ready();
     let bench = Bench::with_scenario(SMALL);
-    for (engine, other) in [("rapier", "mujoco"), ("mujoco", "rapier")] {
-        let answer = bench.run(format!("run s.toml --engine {engine} --json"));
-        let report = answer.exits_with(0).json();
+    let by_mujoco = bench.run("run s.toml --engine mujoco --json").exits_with(0);
+    let by_rapier = &small_run().1;
+    for (answer, engine, other) in [
+        (by_rapier, "rapier", "mujoco"),
+        (&by_mujoco, "mujoco", "rapier"),
+    ] {
+        let report = answer.json();
         let configuration = &configurations(&report)[0];
         assert!(configuration["engines"][engine].is_object());
         assert_eq!(configuration["engines"][other], Value::Null);
@@ -369,8 +374,7 @@ fn robot_of_the_command_line_is_the_one_that_is_reported() {
     let report = answer.exits_with(0).json();
     assert_eq!(report["provenance"]["inputs"][1]["file"], "arm.urdf");
     // The shipped numbers under another name give the shipped results.
-    let shipped = bench.run("run s.toml --engine rapier --json");
-    let shipped = shipped.json();
+    let shipped = small_run().1.json();
     assert_eq!(
         configurations(&report)[0]["engines"],
         configurations(&shipped)[0]["engines"]

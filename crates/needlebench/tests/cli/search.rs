@@ -1,8 +1,9 @@
 //! `search`: from a study file to the best choice, whatever happens on the way.
 
 use std::fmt::Display;
+use std::sync::OnceLock;
 
-use crate::support::{Answer, Bench, Json, has_keys, holds};
+use crate::support::{Answer, Bench, Json, SMALL, has_keys, holds};
 
 /// Three heights and two mounts of the tool.
 const STUDY: &str = r#"
@@ -48,10 +49,22 @@ fn written(bench: &Bench, folder: &str) -> Vec<(String, Vec<u8>)> {
         .collect()
 }
 
+/// The search on one thread, for several tests.
+fn whole() -> &'static (Bench, Answer) {
+    static WHOLE: OnceLock<(Bench, Answer)> = OnceLock::new();
+    WHOLE.get_or_init(|| {
+        let bench = Bench::shared();
+        bench.write("s.toml", SMALL);
+        bench.write("study.toml", STUDY);
+        let answer = run(&bench, "--json --jobs 1").exits_with(0);
+        (bench, answer)
+    })
+}
+
 #[test]
 fn the_answer_has_figures_of_layouts_that_nothing_was_compared_by() {
-    let bench = Bench::with_study(STUDY);
-    let document = run(&bench, "--json").exits_with(0).json();
+    let (bench, answer) = whole();
+    let document = answer.json();
     has_keys(
         &document,
         "schema_version study_id answer candidates generations",
@@ -70,9 +83,11 @@ fn the_answer_has_figures_of_layouts_that_nothing_was_compared_by() {
             .path("out/best/search/gen_000/results.parquet")
             .exists()
     );
-    let again = run(&bench, "").exits_with(2);
+    let again = run(bench, "").exits_with(2);
     again.complains(["--resume"]);
-    let text = run(&bench, "--resume").exits_with(0).stdout;
+    let resumed = Bench::with_study(STUDY);
+    resumed.copy(bench, "out");
+    let text = run(&resumed, "--resume").exits_with(0).stdout;
     holds(&text, ["best", "works"]);
     assert!(
         text.lines().all(|line| line.chars().count() <= 100),
@@ -82,9 +97,7 @@ fn the_answer_has_figures_of_layouts_that_nothing_was_compared_by() {
 
 #[test]
 fn threads_shards_and_breaks_give_the_same_bytes() {
-    let whole = Bench::with_study(STUDY);
-    run(&whole, "--jobs 1").exits_with(0);
-    let expected = written(&whole, "out/best");
+    let expected = written(&whole().0, "out/best");
 
     let threads = Bench::with_study(STUDY);
     run(&threads, "--jobs 3").exits_with(0);

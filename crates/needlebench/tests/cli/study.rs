@@ -1,10 +1,11 @@
 //! `study` and `merge`: from a study file to a folder of results.
 
 use std::fmt::Display;
+use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::support::{Bench, Json, has_keys, holds, workspace};
+use crate::support::{Answer, Bench, Json, SMALL, has_keys, holds, workspace};
 
 /// 96 static cases.
 const STUDY: &str = r#"
@@ -31,14 +32,32 @@ key = "tool.mount_rotation_deg"
 values = [90, 180]
 "#;
 
-fn run(bench: &Bench, more: impl Display) -> crate::support::Answer {
+fn run(bench: &Bench, more: impl Display) -> Answer {
     bench.run(format!("study study.toml --quiet {more}"))
+}
+
+/// The study, computed once for several tests.
+fn whole() -> &'static (Bench, Answer) {
+    static WHOLE: OnceLock<(Bench, Answer)> = OnceLock::new();
+    WHOLE.get_or_init(|| {
+        let bench = Bench::shared();
+        bench.write("s.toml", SMALL);
+        bench.write("study.toml", STUDY);
+        let answer = run(&bench, "--csv --junit junit.xml --jobs 2").exits_with(0);
+        (bench, answer)
+    })
+}
+
+/// A bench with the study's results.
+fn with_results() -> Bench {
+    let bench = Bench::with_study(STUDY);
+    bench.copy(&whole().0, "out");
+    bench
 }
 
 #[test]
 fn a_study_leaves_a_table_a_summary_and_a_page() {
-    let bench = Bench::with_study(STUDY);
-    let answer = run(&bench, "--csv --junit junit.xml").exits_with(0);
+    let (bench, answer) = whole();
     answer.says(["96 cases", "Right-Up-Fold", "height"]);
     for file in [
         "results.parquet",
@@ -189,8 +208,7 @@ fn named_levels_are_held_against_each_other_where_nothing_is_to_be_chosen() {
 
 #[test]
 fn what_was_planned_for_the_gap_is_not_planned_again() {
-    let bench = Bench::with_study(STUDY);
-    run(&bench, "--no-page").exits_with(0);
+    let bench = with_results();
     let whole = bench.read("out/moved/summary.json");
     let kept = bench.text("out/moved/replanned.txt");
     // Damage is seen, and made good.
@@ -205,8 +223,7 @@ fn what_was_planned_for_the_gap_is_not_planned_again() {
 
 #[test]
 fn a_case_alone_has_the_numbers_of_its_rows() {
-    let bench = Bench::with_study(STUDY);
-    run(&bench, "--csv --no-page").exits_with(0);
+    let bench = &whole().0;
     let table = bench.text("out/moved/results.csv");
     let mut lines = table.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -214,7 +231,7 @@ fn a_case_alone_has_the_numbers_of_its_rows() {
     assert_eq!(rows.len(), 8 * 96);
     let mut compared = 0;
     for case in [0, 41, 95] {
-        let alone = run(&bench, format!("--case {case} --json"))
+        let alone = run(bench, format!("--case {case} --json"))
             .exits_with(0)
             .json();
         let of_case: Vec<_> = rows
@@ -247,10 +264,6 @@ fn a_case_alone_has_the_numbers_of_its_rows() {
 #[test]
 fn shards_on_any_number_of_threads_merge_into_the_same_bytes() {
     let bench = Bench::with_study(STUDY);
-    run(&bench, "--jobs 2").exits_with(0);
-    let whole: Vec<Vec<u8>> = ["results.parquet", "summary.json", "report.html"]
-        .map(|file| bench.read(&format!("out/moved/{file}")))
-        .into();
     let mut merge = "merge study.toml --out merged".to_owned();
     for k in 1..=3 {
         let (shard, out) = (format!("{k}/3"), format!("shard{k}"));
@@ -262,12 +275,10 @@ fn shards_on_any_number_of_threads_merge_into_the_same_bytes() {
         merge += &format!(" {out}/moved");
     }
     bench.run(&merge).exits_with(0);
-    for (file, bytes) in ["results.parquet", "summary.json", "report.html"]
-        .into_iter()
-        .zip(&whole)
-    {
+    for file in ["results.parquet", "summary.json", "report.html"] {
+        let whole = whole().0.read(&format!("out/moved/{file}"));
         assert!(
-            bench.read(&format!("merged/moved/{file}")) == *bytes,
+            bench.read(&format!("merged/moved/{file}")) == whole,
             "{file}"
         );
     }
@@ -277,11 +288,8 @@ fn shards_on_any_number_of_threads_merge_into_the_same_bytes() {
 fn results_do_not_depend_on_how_the_study_was_called() {
     let bench = Bench::with_study(STUDY);
     let absolute = bench.path("study.toml").display().to_string();
-    let all = "--quiet --csv --out";
-    bench.run(format!("study study.toml {all} a")).exits_with(0);
-    bench
-        .run(format!("study '{absolute}' {all} b"))
-        .exits_with(0);
+    let arguments = format!("study '{absolute}' --quiet --csv --jobs 1");
+    bench.run(arguments).exits_with(0);
     let files = [
         "replanned.txt",
         "report.html",
@@ -291,17 +299,16 @@ fn results_do_not_depend_on_how_the_study_was_called() {
         "summary.json",
         "summary.md",
     ];
-    assert_eq!(bench.tree("a").len(), files.len());
+    assert_eq!(bench.tree("out").len(), files.len());
     for file in files {
-        let [a, b] = ["a", "b"].map(|folder| bench.read(&format!("{folder}/moved/{file}")));
-        assert!(a == b, "{file} differs");
+        let [here, there] = [&bench, &whole().0].map(|at| at.read(&format!("out/moved/{file}")));
+        assert!(here == there, "{file} differs");
     }
 }
 
 #[test]
 fn a_folder_with_results_is_neither_overwritten_nor_mixed() {
-    let bench = Bench::with_study(STUDY);
-    run(&bench, "--no-page").exits_with(0);
+    let bench = with_results();
     let table = bench.read("out/moved/results.parquet");
     run(&bench, "").exits_with(2).complains(["--resume"]);
     run(&bench, "--resume").exits_with(0);

@@ -104,6 +104,13 @@ impl Bench {
         }
     }
 
+    /// For several tests: below `target`, since nobody removes it.
+    pub fn shared() -> Self {
+        Self {
+            folder: tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap(),
+        }
+    }
+
     /// With a scenario `s.toml`.
     pub fn with_scenario(text: &str) -> Self {
         let bench = Self::new();
@@ -137,6 +144,15 @@ impl Bench {
 
     pub fn read_json(&self, name: &str) -> Value {
         serde_json::from_slice(&self.read(name)).unwrap()
+    }
+
+    /// Copies all below a folder of another one.
+    pub fn copy(&self, other: &Self, name: &str) {
+        for file in other.tree(name) {
+            let to = self.path(name).join(&file);
+            fs::create_dir_all(to.parent().unwrap()).unwrap();
+            fs::copy(other.path(name).join(&file), to).unwrap();
+        }
     }
 
     /// Every file below a folder, relative to it, sorted.
@@ -212,6 +228,25 @@ pub fn mujoco_is_ready() {
     static READY: OnceLock<Answer> = OnceLock::new();
     let doctor = READY.get_or_init(|| Bench::new().run("doctor --json"));
     assert_eq!(doctor.status, Some(0), "{doctor:#?}");
+}
+
+/// A run of `SMALL` in rapier that tests look at in common: its folder, and what it printed.
+pub fn small_run() -> &'static (Bench, Answer) {
+    static RUN: OnceLock<(Bench, Answer)> = OnceLock::new();
+    RUN.get_or_init(|| run_once("run s.toml --engine rapier --json"))
+}
+
+/// The same with all its tables.
+pub fn small_run_wide() -> &'static (Bench, Answer) {
+    static RUN: OnceLock<(Bench, Answer)> = OnceLock::new();
+    RUN.get_or_init(|| run_once("run s.toml --engine rapier --wide"))
+}
+
+fn run_once(arguments: &str) -> (Bench, Answer) {
+    let bench = Bench::shared();
+    bench.write("s.toml", SMALL);
+    let answer = bench.run(arguments).exits_with(0);
+    (bench, answer)
 }
 
 /// Asserts that a text holds all of these.
