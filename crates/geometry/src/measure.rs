@@ -13,7 +13,7 @@ pub fn corners(mesh: &TriangleMesh, triangle: [u32; 3]) -> [Point3<f64>; 3] {
 }
 
 /// Twice the area times the outward normal.
-pub fn area_vector([a, b, c]: [Point3<f64>; 3]) -> Vector3<f64> {
+pub(crate) fn area_vector([a, b, c]: [Point3<f64>; 3]) -> Vector3<f64> {
     (b - a).cross(&(c - a))
 }
 

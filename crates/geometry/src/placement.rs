@@ -40,7 +40,7 @@ impl Placement {
 
     /// A point of the parent, seen from the placed frame.
     #[inline]
-    pub fn inverse_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn inverse_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.rotation.tr_mul(&(point - self.translation))
     }
 

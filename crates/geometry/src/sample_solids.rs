@@ -56,7 +56,7 @@ pub fn ell() -> TriangleMesh {
 
 /// Surface of revolution about z through profile points (radius, height), the first and the last
 /// of which lie on the axis; the solid is to the left of the profile.
-pub fn revolved(profile: &[[f64; 2]], around: u32) -> TriangleMesh {
+pub(crate) fn revolved(profile: &[[f64; 2]], around: u32) -> TriangleMesh {
     let inner = &profile[1..profile.len() - 1];
     let rings = u32::try_from(inner.len()).expect("few rings");
     let mut vertices_m = vec![

@@ -29,7 +29,7 @@ impl BoundingCapsule {
     }
 
     /// Around a cylinder about z.
-    pub fn around_cylinder(radius_m: f64, half_length_m: f64) -> Self {
+    pub(crate) fn around_cylinder(radius_m: f64, half_length_m: f64) -> Self {
         let ball_radius_m = libm::hypot(radius_m, half_length_m);
         if radius_m > half_length_m {
             return Self {
@@ -44,7 +44,7 @@ impl BoundingCapsule {
     }
 
     /// Around a box along the axes.
-    pub fn around_cuboid(half_extents_m: &Vector3<f64>) -> Self {
+    pub(crate) fn around_cuboid(half_extents_m: &Vector3<f64>) -> Self {
         let long = half_extents_m.imax();
         let mut half_axis = Vector3::zeros();
         half_axis[long] = half_extents_m[long];

@@ -68,7 +68,7 @@ impl ConvexCore {
     }
 
     /// A point of the core, not on its boundary unless it has no inside.
-    pub fn some_point(&self) -> Vector3<f64> {
+    pub(crate) fn some_point(&self) -> Vector3<f64> {
         match self {
             Self::Point | Self::Segment { .. } | Self::Cylinder { .. } | Self::Cuboid { .. } => {
                 Vector3::zeros()

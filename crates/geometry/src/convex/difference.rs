@@ -46,7 +46,7 @@ impl<'s> Difference<'s> {
     }
 
     /// With a guess of A's first farthest vertex; it only saves time.
-    pub fn with_hint(self, hint_a: usize) -> Self {
+    pub(crate) fn with_hint(self, hint_a: usize) -> Self {
         Self { hint_a, ..self }
     }
 

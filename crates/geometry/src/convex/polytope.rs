@@ -345,7 +345,7 @@ impl Polytope {
     }
 
     /// Point of core A that makes up the polytope's point nearest to a difference.
-    pub fn nearest_on_a(&self, difference: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn nearest_on_a(&self, difference: &Vector3<f64>) -> Vector3<f64> {
         let mut nearest: Option<Simplex> = None;
         for face in self.faces.iter().filter(|face| face.alive) {
             let corners = face.corners.map(|i| Vertex {

@@ -52,7 +52,7 @@ impl Simplex {
         }
     }
 
-    pub fn is_closer_than(&self, other: &Self) -> bool {
+    pub(crate) fn is_closer_than(&self, other: &Self) -> bool {
         self.closest.norm_squared() < other.closest.norm_squared()
     }
 
@@ -61,7 +61,7 @@ impl Simplex {
     }
 
     /// Where the closest difference is on core A.
-    pub fn on_a(&self) -> Vector3<f64> {
+    pub(crate) fn on_a(&self) -> Vector3<f64> {
         (0..self.len).fold(Vector3::zeros(), |sum, i| {
             sum + self.vertices[i].a * self.weights[i]
         })

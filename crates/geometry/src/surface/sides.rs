@@ -73,7 +73,7 @@ impl<'s> Sides<'s> {
     }
 
     /// Middle of what encloses A.
-    pub fn centre_a(&self) -> Vector3<f64> {
+    pub(crate) fn centre_a(&self) -> Vector3<f64> {
         self.b_from_a.point(&match &self.a {
             Mover::Convex { bound, .. } => bound.centre,
             Mover::Surface(tree) => tree.root().centre,
@@ -167,7 +167,7 @@ impl<'s> Sides<'s> {
 
     /// Calls `visit` with the convex pieces of A among the leaves, each against each triangle of
     /// B, until it returns false.
-    pub fn each_pair(
+    pub(crate) fn each_pair(
         &self,
         ones: &[[Vector3<f64>; 3]],
         others: &[[Vector3<f64>; 3]],

@@ -35,7 +35,7 @@ pub(crate) struct Crossing {
 
 impl Crossing {
     /// What it adds to the winding number of the line's origin.
-    pub fn turns_ahead(&self) -> i32 {
+    pub(crate) fn turns_ahead(&self) -> i32 {
         match (self.at > 0.0, self.leaves) {
             (false, _) => 0,
             (true, true) => 1,
