@@ -193,7 +193,7 @@ impl FileKind {
 
 /// What is wrong with a file of another kind than `wanted`; `None` if it is of that kind or of none that is
 /// known.
-pub fn wrong_kind(path: &Path, wanted: FileKind) -> Option<Finding> {
+pub(crate) fn wrong_kind(path: &Path, wanted: FileKind) -> Option<Finding> {
     let kind = FileKind::of(path).filter(|kind| *kind != wanted)?;
     let message = format!("this is {}, not {}", kind.words(), wanted.wanted_words());
     Some(Finding::new(path.display().to_string(), message).hint(kind.hint(path)))

@@ -8,11 +8,11 @@ use std::io::{self, Read};
 use std::path::Path;
 
 /// Largest text that is read: scenario, study, thresholds, calibration, SRDF, URDF, parameters.
-pub const MOST_TEXT_BYTES: u64 = 16 << 20;
+pub(crate) const MOST_TEXT_BYTES: u64 = 16 << 20;
 
 /// Largest file of data that is read: meshes, logs, reports, manifests. A mesh of ten million triangles has
 /// 500 MB.
-pub const MOST_DATA_BYTES: u64 = 1 << 30;
+pub(crate) const MOST_DATA_BYTES: u64 = 1 << 30;
 
 /// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -70,15 +70,15 @@ pub fn open_input(path: &Path) -> Result<File, InputError> {
     Ok(file)
 }
 
-/// Reads a regular file of data, up to [`MOST_DATA_BYTES`].
+/// Reads a regular file of data, up to `MOST_DATA_BYTES`.
 ///
 /// # Errors
 /// See [`InputError`].
-pub fn read_data(path: &Path) -> Result<Vec<u8>, InputError> {
+pub(crate) fn read_data(path: &Path) -> Result<Vec<u8>, InputError> {
     read(path, MOST_DATA_BYTES)
 }
 
-/// Reads a regular file of text, up to [`MOST_TEXT_BYTES`].
+/// Reads a regular file of text, up to `MOST_TEXT_BYTES`.
 ///
 /// # Errors
 /// See [`InputError`].
@@ -86,7 +86,7 @@ pub fn read_text(path: &Path) -> Result<String, InputError> {
     text(read(path, MOST_TEXT_BYTES)?)
 }
 
-/// Reads a regular file of data that is text, up to [`MOST_DATA_BYTES`].
+/// Reads a regular file of data that is text, up to `MOST_DATA_BYTES`.
 ///
 /// # Errors
 /// See [`InputError`].

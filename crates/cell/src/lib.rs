@@ -60,12 +60,10 @@ pub use excitation_text::ExcitationText;
 pub use family::{
     Change, KeyPath, MovedPhantom, PhantomMove, PhantomMoves, ScenarioFamily, Setting,
 };
-pub use file_kind::{FileKind, or_wrong_kind, wrong_kind};
+pub use file_kind::{FileKind, or_wrong_kind};
 pub use files::{ModelSource, PackagePaths, sha256_hex};
 pub use finding::{Finding, nearest_name};
-pub use input::{
-    InputError, MOST_DATA_BYTES, MOST_TEXT_BYTES, open_input, read_data, read_data_text, read_text,
-};
+pub use input::{InputError, open_input, read_data_text, read_text};
 pub use limit::{Limit, digits_apart};
 pub use log_columns::{LogColumns, MappedColumns};
 pub use marker_list::{ListedMarker, MarkerFrame, MarkerList, marker_list_schema};
@@ -85,7 +83,7 @@ pub use robot::{
     Calibration, DisabledPair, LinkEnclosure, MOVING_LINK_LABELS, MissingInertia, OriginDeviation,
     Srdf, enclosures,
 };
-pub use scenario::{REJECTION_RULES, envelope, ranking};
+pub use scenario::{envelope, ranking};
 pub use scenario_edit::ScenarioEdit;
 pub use scenario_text::{relative, scenario_text};
 pub use study::criteria as study_criteria;

@@ -92,7 +92,7 @@ const RULES: [(&str, &str); 12] = [
     ("max_tip_rms_mm", "expected tip error over its limit"),
 ];
 
-/// What people call a rule that rejects configurations: one of [`crate::REJECTION_RULES`].
+/// What people call a rule that rejects configurations: one of `crate::REJECTION_RULES`.
 pub fn rule_in_words(rule: &str) -> &str {
     let known = RULES.iter().find(|(name, _)| *name == rule);
     known.map_or(rule, |(_, words)| words)

@@ -1,7 +1,7 @@
 //! Arms: what is known of one besides its URDF, and whose data a robot has.
 //!
 //! An arm is a folder with a URDF and an `arm.toml`. Nothing about a particular arm stands in code but
-//! the name of the one that is taken where nobody names any ([`DEFAULT_ARM`]).
+//! the name of the one that is taken where nobody names any (`DEFAULT_ARM`).
 
 mod brakes;
 mod check;
@@ -23,7 +23,7 @@ pub(crate) use choice::{choose_arm, note_on_no_arm};
 use data::ArmData;
 
 /// The arm of scenarios that name none.
-pub const DEFAULT_ARM: &str = "ur3";
+pub(crate) const DEFAULT_ARM: &str = "ur3";
 
 /// Name of the file with an arm's data.
 const ARM_FILE: &str = "arm.toml";

@@ -56,7 +56,7 @@ impl KeyPath {
     }
 
     /// Whether it is a key of the case's goal.
-    pub fn is_of_goal(&self) -> bool {
+    pub(crate) fn is_of_goal(&self) -> bool {
         self.0.first() == Some(&Step::Name(GOAL.to_owned()))
     }
 

@@ -47,7 +47,7 @@ impl ArmInUse {
     }
 
     /// Whether the robot has the arm's lengths.
-    pub fn has_its_lengths(&self) -> bool {
+    pub(crate) fn has_its_lengths(&self) -> bool {
         self.deviation_m <= SAME_ARM_M
     }
 

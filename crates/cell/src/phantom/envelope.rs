@@ -46,7 +46,7 @@ pub(super) struct Section {
 }
 
 impl Section {
-    pub fn front_m(&self) -> f64 {
+    pub(crate) fn front_m(&self) -> f64 {
         self.center_y_m - self.half_depth_m
     }
 
@@ -55,7 +55,7 @@ impl Section {
     }
 
     /// The section moved outwards by a distance, m.
-    pub fn grown_by(&self, by_m: f64) -> Self {
+    pub(crate) fn grown_by(&self, by_m: f64) -> Self {
         Self {
             half_width_m: self.half_width_m + by_m,
             half_depth_m: self.half_depth_m + by_m,
@@ -69,12 +69,12 @@ impl Section {
         self.half_depth_m * libm::pow(1.0 - libm::pow(across, self.exponent), 1.0 / self.exponent)
     }
 
-    pub fn front_at_m(&self, x_m: f64) -> f64 {
+    pub(crate) fn front_at_m(&self, x_m: f64) -> f64 {
         self.center_y_m - self.half_depth_at_m(x_m)
     }
 
     /// Point at an angle from the back (0) over the left side (pi/2) to the front (pi).
-    pub fn at_angle(&self, angle_rad: f64) -> Point2<f64> {
+    pub(crate) fn at_angle(&self, angle_rad: f64) -> Point2<f64> {
         let (sine, cosine) = libm::sincos(angle_rad);
         let power = 2.0 / self.exponent;
         Point2::new(
@@ -83,8 +83,8 @@ impl Section {
         )
     }
 
-    /// Angle, as in [`Section::at_angle`], of the point at `x_m >= 0` of the front half.
-    pub fn front_angle_rad(&self, x_m: f64) -> f64 {
+    /// Angle, as in `Section::at_angle`, of the point at `x_m >= 0` of the front half.
+    pub(crate) fn front_angle_rad(&self, x_m: f64) -> f64 {
         let sine = libm::pow(
             (x_m / self.half_width_m).clamp(0.0, 1.0),
             self.exponent / 2.0,
@@ -206,7 +206,7 @@ impl Envelope {
     }
 
     /// The smooth skin at a height, m.
-    pub fn skin_section(&self, z_m: f64) -> Section {
+    pub(crate) fn skin_section(&self, z_m: f64) -> Section {
         let scale = Self::skin_scale(z_m / self.half_length_m);
         Section {
             half_width_m: scale * self.half_breadth_m,
@@ -217,7 +217,7 @@ impl Envelope {
     }
 
     /// The inside of the rib cage (the parietal pleura) at a height, m.
-    pub fn cage_section(&self, z_m: f64) -> Section {
+    pub(crate) fn cage_section(&self, z_m: f64) -> Section {
         /// The cage narrows to a dome above this height and would close at the other (fractions of
         /// the half length; assumed).
         const DOME: (f64, f64) = (0.25, 1.10);
@@ -236,12 +236,12 @@ impl Envelope {
     }
 
     /// The cage at its widest level.
-    pub fn widest_cage(&self) -> Section {
+    pub(crate) fn widest_cage(&self) -> Section {
         self.cage_section(WIDEST * self.half_length_m)
     }
 
     /// The skin as a convex polyhedron in the phantom frame, inscribed in the smooth skin.
-    pub fn skin_mesh(&self) -> ConvexMesh {
+    pub(crate) fn skin_mesh(&self) -> ConvexMesh {
         // The loft scales about its own origin, which is the taper's fixed point; shift it back.
         let taper_y_m = TAPER_TOWARDS_BACK * self.half_depth_m;
         let polygon: Vec<Point2<f64>> = superellipse(

@@ -45,7 +45,7 @@ impl HalfSpaces {
     }
 
     /// Depth of the shallowest point of a solid, m; negative when it sticks out.
-    pub fn depth_of_solid_m(&self, solid: &Solid) -> f64 {
+    pub(crate) fn depth_of_solid_m(&self, solid: &Solid) -> f64 {
         /// More than the rounding of a ball's reach.
         const ROUNDING_M: f64 = 1e-9;
         // A ball around the solid shows most planes to be farther away than the nearest one.
@@ -73,7 +73,7 @@ impl HalfSpaces {
     }
 
     /// Face whose plane is nearest to a point of the surface: its outward normal.
-    pub fn nearest_normal(&self, point: &Point3<f64>) -> Option<UnitVector3<f64>> {
+    pub(crate) fn nearest_normal(&self, point: &Point3<f64>) -> Option<UnitVector3<f64>> {
         let depth_m = |plane: &HalfSpace| plane.offset_m - plane.normal.dot(&point.coords);
         self.0
             .iter()

@@ -40,7 +40,7 @@ pub(crate) struct PlannedSections(Vec<(usize, GoalSection)>);
 
 impl PlannedSections {
     /// The scenario with these sections: it stays what its file says, and is planned anew where it is changed.
-    pub fn put_back(self, mut resolved: ResolvedScenario) -> ResolvedScenario {
+    pub(crate) fn put_back(self, mut resolved: ResolvedScenario) -> ResolvedScenario {
         for (index, section) in self.0 {
             resolved.scenario.goals[index] = section;
         }

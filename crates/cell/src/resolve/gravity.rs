@@ -39,7 +39,7 @@ impl GravitySettings {
         clippy::float_cmp,
         reason = "a copy of the world's, unless the scenario says otherwise"
     )]
-    pub fn is_believed_wrongly(&self) -> bool {
+    pub(crate) fn is_believed_wrongly(&self) -> bool {
         self.believed_m_s2 != self.world_m_s2
     }
 }

@@ -10,9 +10,8 @@ use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::{Body, Pose};
 
 use super::arm_values::test_cube;
-pub use crate::scenario::{
-    Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES, STANDARD_EDGES_MM,
-};
+pub(crate) use crate::scenario::STANDARD_EDGES_MM;
+pub use crate::scenario::{Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES};
 use crate::toml_text::TomlText;
 use crate::{Finding, Robot, Tool};
 

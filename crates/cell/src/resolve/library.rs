@@ -219,7 +219,7 @@ impl ModelLibrary {
     }
 
     /// The real arms of a calibration block, for a robot.
-    pub fn real_arms(
+    pub(crate) fn real_arms(
         &self,
         toml: &TomlText<'_>,
         block: &CalibrationBlock,
@@ -239,7 +239,7 @@ impl ModelLibrary {
 
     /// What a calibration that was measured on the sagging arm takes of its sag; with the tool on, or
     /// without, and with gravity in the frame of `base_link` as it was then.
-    pub fn absorbed_sag(
+    pub(crate) fn absorbed_sag(
         &self,
         robot: &Robot,
         tool: Option<&Tool>,

@@ -106,7 +106,7 @@ impl StillLayout {
     ///
     /// # Errors
     /// As [`resolve`](super::resolve) has them.
-    pub fn with_phantom_at(
+    pub(crate) fn with_phantom_at(
         &self,
         section: &PhantomSection,
     ) -> Result<Option<(PlacedPhantom, Goal)>, Vec<Finding>> {
@@ -157,7 +157,7 @@ impl StillLayout {
 impl StillLayout {
     /// Whether the patient's limbs lie beside the chest as in the layout: they may not where the chest is
     /// turned on what it rests on.
-    pub fn lies_alike(&self, placed: &PlacedPhantom) -> bool {
+    pub(crate) fn lies_alike(&self, placed: &PlacedPhantom) -> bool {
         /// More than the rounding of a place, m and rad.
         const SAME: f64 = 1e-9;
         let known = self.resolved.phantom.as_ref();

@@ -72,7 +72,7 @@ impl Standing<'_> {
     }
 
     /// Where the patient lies alone: what is left of [`Standing::check`] if all else is known to stand.
-    pub fn check_lying(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
+    pub(crate) fn check_lying(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
         self.check_base_in_patient()?;
         self.check_phantom(notes)?;
         self.check_bore()?;

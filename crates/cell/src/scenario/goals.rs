@@ -13,7 +13,7 @@ use crate::schema::{LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
 
 /// Rules that reject configurations: the words that `expected` may use.
-pub const REJECTION_RULES: [&str; 10] = [
+pub(crate) const REJECTION_RULES: [&str; 10] = [
     "needle_route",
     "unreachable",
     "merged",
@@ -26,7 +26,7 @@ pub const REJECTION_RULES: [&str; 10] = [
     "no_motion",
 ];
 
-/// Outcomes that `expected` may use besides [`REJECTION_RULES`]: it works and meets all criteria, or
+/// Outcomes that `expected` may use besides `REJECTION_RULES`: it works and meets all criteria, or
 /// misses one.
 pub(crate) const OUTCOMES: [&str; 2] = ["ok", "failed"];
 

@@ -13,7 +13,7 @@ use crate::toml_text::TomlText;
 pub const STANDARD_CYCLES: u32 = 30;
 
 /// Edge lengths of the standard's cube, mm.
-pub const STANDARD_EDGES_MM: [f64; 4] = [250.0, 400.0, 630.0, 1000.0];
+pub(crate) const STANDARD_EDGES_MM: [f64; 4] = [250.0, 400.0, 630.0, 1000.0];
 
 /// The test of a robot's accuracy and repeatability by ISO 9283, instead of goals: five poses in a
 /// cube, visited again and again.

@@ -52,7 +52,8 @@ pub use events::{EventsSection, PressClass, PressSection, StopSection};
 pub use excitation::{ExcitationSection, PayloadSection, SweepSection};
 pub use fixtures::{GantrySection, MountKind, MountSection, TableSection};
 pub(crate) use goals::EVERY_CONFIGURATION;
-pub use goals::{FlangePose, GoalSection, REJECTION_RULES, Target};
+pub(crate) use goals::REJECTION_RULES;
+pub use goals::{FlangePose, GoalSection, Target};
 pub use imperfections::{
     ArmClass, BreathState, BreathingBlock, CalibrationBlock, ControlBlock, CovarianceMm2,
     ElasticityBlock, EncoderBlock, ExpectedSection, FrictionBlock, GuideBlock, HandEyeBlock,
@@ -60,9 +61,8 @@ pub use imperfections::{
     RegistrationBlock, SkinMarkersBlock, TorqueLimitsBlock,
 };
 pub(crate) use imperfections::{POPULATION, covariance_m2};
-pub use iso9283::{
-    Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES, STANDARD_EDGES_MM,
-};
+pub(crate) use iso9283::STANDARD_EDGES_MM;
+pub use iso9283::{Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES};
 pub use models::shipped_tools;
 pub use motion::{MotionSection, StartSection};
 pub use obstacles::{

@@ -123,9 +123,9 @@ fn models(_: &mut SchemaGenerator) -> Schema {
 pub(crate) struct ChestSize;
 
 impl ChestSize {
-    pub const BREADTH_MM: [f64; 2] = [150.0, 600.0];
-    pub const DEPTH_MM: [f64; 2] = [120.0, 600.0];
-    pub const LENGTH_MM: [f64; 2] = [200.0, 700.0];
+    pub(crate) const BREADTH_MM: [f64; 2] = [150.0, 600.0];
+    pub(crate) const DEPTH_MM: [f64; 2] = [120.0, 600.0];
+    pub(crate) const LENGTH_MM: [f64; 2] = [200.0, 700.0];
 }
 
 /// Unit of a file's coordinates.

@@ -15,11 +15,11 @@ pub(crate) use placing::{Room, check_sides, have_room_by_boxes, resolve_people};
 /// Drillis and Contini (1966). The medians of British adults in Pheasant, Bodyspace (1996), give
 /// 1630/1740 = 0.937 for men and 1505/1610 = 0.935 for women; the 5th and 95th percentiles lie
 /// between 0.932 and 0.942, which is 10 mm at most.
-pub const EYE_HEIGHT_PER_STATURE: f64 = 0.936;
+pub(crate) const EYE_HEIGHT_PER_STATURE: f64 = 0.936;
 
 /// Half of the depth of a body with its clothes, m: how near the middle of a person comes to what
 /// stands in the way. Assumed: abdominal depths of adults lie between 0.21 and 0.34 m.
-pub const BODY_RADIUS_M: f64 = 0.15;
+pub(crate) const BODY_RADIUS_M: f64 = 0.15;
 
 /// Statures where a person has none, m: from a small woman to a tall man.
 const DEFAULT_STATURES_M: [f64; 3] = [1.60, 1.75, 1.90];
