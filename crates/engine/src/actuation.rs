@@ -131,7 +131,7 @@ impl JointFriction {
 
 impl Actuation {
     /// Whether nothing is imperfect.
-    pub fn is_ideal(&self) -> bool {
+    pub(crate) fn is_ideal(&self) -> bool {
         *self
             == Self {
                 seed: self.seed,
@@ -145,7 +145,7 @@ impl Actuation {
         clippy::cast_sign_loss,
         reason = "checked: not negative, and far below 2^52 steps"
     )]
-    pub fn delay_steps(&self, timestep_s: f64) -> usize {
+    pub(crate) fn delay_steps(&self, timestep_s: f64) -> usize {
         (self.torque_delay_s / timestep_s - PERIOD_SLACK)
             .ceil()
             .max(0.0) as usize

@@ -179,7 +179,7 @@ impl ClosedLoop {
     }
 
     /// Says whether the loop is unstable at a posture, why, and what would be stable.
-    pub fn instability(
+    pub(crate) fn instability(
         mass: &Matrix6<f64>,
         servo: &Servo,
         actuation: &Actuation,

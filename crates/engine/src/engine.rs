@@ -110,10 +110,4 @@ impl<'a> ArmSpec<'a> {
             timestep_s: settings.timestep_ms * 1e-3,
         }
     }
-
-    /// With another length of the step, s.
-    #[must_use]
-    pub fn at_step(self, timestep_s: f64) -> Self {
-        Self { timestep_s, ..self }
-    }
 }

@@ -106,7 +106,7 @@ pub enum HarnessError {
 
 impl HarnessError {
     /// Whether the process is of no further use.
-    pub fn ends_the_process(&self) -> bool {
+    pub(crate) fn ends_the_process(&self) -> bool {
         !matches!(
             self,
             Self::Engine { .. } | Self::Length { .. } | Self::TooLarge { .. }

@@ -115,7 +115,7 @@ impl RefereePlant {
     }
 
     /// An arm by its equations of motion alone.
-    pub fn from_dynamics(
+    pub(crate) fn from_dynamics(
         dynamics: Dynamics,
         world_from_base_link: Pose,
         timestep_s: f64,
@@ -144,7 +144,7 @@ impl RefereePlant {
     }
 
     /// Places the arm in motion at `position` with `velocity`, as [`Plant::reset`] does at rest.
-    pub fn reset_in_motion(&mut self, position: &Joints, velocity: &Joints) -> PlantState {
+    pub(crate) fn reset_in_motion(&mut self, position: &Joints, velocity: &Joints) -> PlantState {
         self.place(position, velocity);
         self.observe(*position, *velocity)
     }
