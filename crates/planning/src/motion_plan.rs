@@ -155,7 +155,7 @@ impl Required {
     }
 
     /// The transfer keeps what start and approach do.
-    pub fn is_reached_by(&self, way: &Way) -> bool {
+    pub(crate) fn is_reached_by(&self, way: &Way) -> bool {
         way.keeps.most_below(&self.target) <= SAME_M
     }
 }

@@ -138,7 +138,7 @@ impl<'s> TransferSearch<'s> {
 
     /// A shorter polygon with the same ends: corners cut off and pieces left out where what replaces
     /// them is free and takes less time.
-    pub fn shortened(&mut self, mut waypoints: Vec<Joints>) -> Vec<Joints> {
+    pub(crate) fn shortened(&mut self, mut waypoints: Vec<Joints>) -> Vec<Joints> {
         self.leave_out(&mut waypoints);
         for _ in 0..SHORTCUTS {
             if waypoints.len() < 3 || self.checks >= self.budget.checks {
@@ -166,7 +166,7 @@ impl<'s> TransferSearch<'s> {
     }
 
     /// The polygon without the waypoints that can be passed by.
-    pub fn straightened(&mut self, mut waypoints: Vec<Joints>) -> Vec<Joints> {
+    pub(crate) fn straightened(&mut self, mut waypoints: Vec<Joints>) -> Vec<Joints> {
         self.leave_out(&mut waypoints);
         waypoints
     }

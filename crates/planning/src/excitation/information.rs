@@ -17,7 +17,7 @@ use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{Body, Chain, Dynamics, JOINT_COUNT, Joints, Pose};
 
 /// Unknowns of a calibration that matter: four for each joint and six for the flange.
-pub const CALIBRATION_UNKNOWNS: usize = 30;
+pub(crate) const CALIBRATION_UNKNOWNS: usize = 30;
 
 /// A value is identified where its standard deviation is below this share of it.
 pub const IDENTIFIED_SHARE: f64 = 0.1;

@@ -12,13 +12,13 @@ use needlebench_kinematics::{JOINT_LABELS, Joints};
 use std::borrow::Cow;
 
 pub use information::{
-    CALIBRATION_UNKNOWNS, CalibrationInformation, IDENTIFIED_SHARE, Identification,
-    JointInformation, NOISE, Noise, PayloadInformation,
+    CalibrationInformation, IDENTIFIED_SHARE, Identification, JointInformation, NOISE, Noise,
+    PayloadInformation,
 };
 pub use search::{FoundRun, SearchError, SearchOptions, search};
 
 /// Time for which a joint stands where a sweep turns, s. Assumed: a few rows of any log.
-pub const TURN_S: f64 = 0.3;
+pub(crate) const TURN_S: f64 = 0.3;
 
 /// What a motion of the run leads to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -175,7 +175,7 @@ impl<'p> Sweep<'p> {
     }
 
     /// What an aim's choice needs to know of the member at a roll.
-    pub fn glance(&mut self, aim: Aim, roll_rad: f64) -> Glance {
+    pub(crate) fn glance(&mut self, aim: Aim, roll_rad: f64) -> Glance {
         self.look(Asked::Merit(aim), roll_rad)
     }
 
@@ -186,7 +186,7 @@ impl<'p> Sweep<'p> {
 
     /// Whether what keeps a roll from working keeps all from working between it and another: it is broken by
     /// more than the arm moves on the way, of the flange where there is no posture.
-    pub fn excludes(&mut self, roll_rad: f64, glance: &Glance, to_rad: f64) -> bool {
+    pub(crate) fn excludes(&mut self, roll_rad: f64, glance: &Glance, to_rad: f64) -> bool {
         let rolls = [roll_rad, to_rad].map(|roll_rad| roll_rad.rem_euclid(TAU));
         match rolls.map(|roll_rad| self.solution(roll_rad)) {
             [Some(from), Some(to)] => {
