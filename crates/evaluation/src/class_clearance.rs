@@ -69,7 +69,7 @@ impl ClearanceReport {
     }
 
     /// The least clearance of arm and tool from what stands around them, the arm's own left out.
-    pub fn least_from_surroundings(&self) -> Option<&ClassClearance> {
+    pub(crate) fn least_from_surroundings(&self) -> Option<&ClassClearance> {
         let classes = self.classes.iter();
         classes
             .filter(|(class, _)| {

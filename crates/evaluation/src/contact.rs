@@ -233,7 +233,7 @@ pub struct ForceBalance {
 /// dynamics is our own. Without friction the force is along the normal, one number from up to six
 /// equations; with it three numbers. None for two bodies that are no pair, and where no joint can
 /// answer the force.
-pub fn force_balance(
+pub(crate) fn force_balance(
     cell: &Cell,
     model: &ClearanceModel,
     bodies: [usize; 2],

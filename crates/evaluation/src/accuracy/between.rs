@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// Least members of each group for Kruskal and Wallis's test: from five on its statistic is near enough to
 /// chi-squared (Siegel and Castellan, Nonparametric Statistics, 1988, 8.4).
-pub const LEAST_MEMBERS: usize = 5;
+pub(crate) const LEAST_MEMBERS: usize = 5;
 
 /// Least blocks for Friedman's test. With three groups the exact tables end at about this many (Siegel and
 /// Castellan, 7.2).
@@ -50,7 +50,7 @@ pub struct Tested {
 ///
 /// # Errors
 /// Why there is nothing to test.
-pub fn kruskal_wallis(groups: &[Vec<f64>]) -> Result<Tested, &'static str> {
+pub(crate) fn kruskal_wallis(groups: &[Vec<f64>]) -> Result<Tested, &'static str> {
     if groups.len() < 2 {
         return Err("there is one group");
     }
@@ -84,7 +84,7 @@ pub fn kruskal_wallis(groups: &[Vec<f64>]) -> Result<Tested, &'static str> {
 ///
 /// # Errors
 /// Why there is nothing to test.
-pub fn friedman(blocks: &[Vec<f64>]) -> Result<Tested, &'static str> {
+pub(crate) fn friedman(blocks: &[Vec<f64>]) -> Result<Tested, &'static str> {
     let groups = blocks.first().map_or(0, Vec::len);
     if blocks.len() < LEAST_BLOCKS {
         return Err("fewer than 10 draws have a value in every group");

@@ -11,7 +11,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-pub use between::{LEAST_BLOCKS, LEAST_MEMBERS, Test, Tested, friedman, kruskal_wallis};
+pub use between::{LEAST_BLOCKS, Test, Tested};
+pub(crate) use between::{friedman, kruskal_wallis};
 pub use spread::Spread;
 
 use crate::metric::{Metric, MetricKey, Unit};

@@ -337,7 +337,7 @@ impl Columns {
     }
 
     /// Column of the poses.
-    pub fn pose_column(&self) -> usize {
+    pub(crate) fn pose_column(&self) -> usize {
         self.of[&Role::Pose]
     }
 

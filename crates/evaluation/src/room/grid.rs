@@ -55,7 +55,7 @@ impl VoxelGrid {
     }
 
     /// Centre of the voxel at a place, m.
-    pub fn center_at_m(&self, place: [usize; 3]) -> Point3<f64> {
+    pub(crate) fn center_at_m(&self, place: [usize; 3]) -> Point3<f64> {
         self.corner_m + Vector3::from(place.map(|each| (each as f64 + 0.5) * self.voxel_m))
     }
 

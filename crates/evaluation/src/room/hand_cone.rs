@@ -11,7 +11,7 @@ use super::obstacles::{Near, PlacedObstacles};
 /// Angle to which the cone is computed, rad.
 pub const CONE_TOLERANCE_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
 /// The hand comes no nearer to the guide's entry than this, m.
-pub const CONE_START_M: f64 = 0.01;
+pub(crate) const CONE_START_M: f64 = 0.01;
 /// Cells that are looked at before the bound reached until then is taken.
 const MOST_CELLS: usize = 20_000;
 /// Cells smaller than this are not cut further, m: what is so near ends the search from below.
@@ -93,7 +93,7 @@ impl Cell {
     }
 }
 
-/// Largest half-angle of a cone about `axis` in which nothing stands between [`CONE_START_M`] and
+/// Largest half-angle of a cone about `axis` in which nothing stands between `CONE_START_M` and
 /// `reach_m` from `apex`.
 ///
 /// Branch and bound over distance, angle and turn: a cell in whose middle the nearest solid is

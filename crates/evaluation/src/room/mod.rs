@@ -21,19 +21,17 @@ use needlebench_kinematics::{Joints, Pose};
 use serde::Serialize;
 
 pub use grid::VoxelGrid;
-pub use hand_cone::{CONE_START_M, CONE_TOLERANCE_RAD, HandCone, hand_cone};
+pub(crate) use hand_cone::CONE_START_M;
+pub use hand_cone::{CONE_TOLERANCE_RAD, HandCone, hand_cone};
 pub use obstacles::{Obstacles, PlacedObstacles, SightLines};
 pub use sector::Sector;
-pub use sight::{
-    ENTRY_DISC_HEIGHT_M, ENTRY_DISC_RADIUS_M, SIGHT_SEGMENTS, SIGHT_SERIES, Sight, SightTargets,
-    measure_sight, sight_segments,
-};
+pub use sight::{ENTRY_DISC_HEIGHT_M, Sight, SightTargets, measure_sight, sight_segments};
 
 /// Radius of the half ball about the entry point that is asked for free space, m: as far as a
 /// forearm with a hand reaches.
 pub const SECTOR_RADIUS_M: f64 = 0.35;
 /// Points nearer to arm or tool than this are not free, m: half of a hand's breadth.
-pub const FREE_MARGIN_M: f64 = 0.05;
+pub(crate) const FREE_MARGIN_M: f64 = 0.05;
 /// Edge of the cubes by which free space is counted, m.
 pub const VOXEL_M: f64 = 0.02;
 
@@ -205,7 +203,7 @@ impl<'a> RoomModel<'a> {
     }
 
     /// Length of the hand's cone, m: as the needle corridor.
-    pub fn hand_reach_m(&self) -> f64 {
+    pub(crate) fn hand_reach_m(&self) -> f64 {
         self.resolved
             .scenario
             .tool

@@ -157,7 +157,7 @@ impl SightLines<'_> {
     }
 
     /// Whether anything is between two points.
-    pub fn is_in_the_way(&mut self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
+    pub(crate) fn is_in_the_way(&mut self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
         let mut solids = self.obstacles.solids.iter().zip(&mut self.likely);
         solids.any(|(placed, likely)| placed.hit(from, to, likely).is_some())
     }

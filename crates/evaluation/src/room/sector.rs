@@ -96,7 +96,7 @@ impl Sector {
     }
 
     /// Share of each region that is not taken; regions that hardly are in the sector are left out.
-    pub fn free_by_region(&self, taken: &[bool]) -> BTreeMap<&'static str, f64> {
+    pub(crate) fn free_by_region(&self, taken: &[bool]) -> BTreeMap<&'static str, f64> {
         if self.regions.len() == 1 {
             return BTreeMap::new();
         }
@@ -109,7 +109,7 @@ impl Sector {
     }
 
     /// Share that is not taken of the half towards `direction`; `None` if hardly any is there.
-    pub fn free_towards(&self, taken: &[bool], direction: &Vector3<f64>) -> Option<f64> {
+    pub(crate) fn free_towards(&self, taken: &[bool], direction: &Vector3<f64>) -> Option<f64> {
         let towards = |index| (self.grid.center_m(index) - self.center_m).dot(direction) > 0.0;
         let (free, all) = self.share(taken, towards);
         (all >= LEAST_VOXELS).then_some(free)

@@ -8,14 +8,14 @@ use super::hand_cone::frame_about;
 use super::obstacles::PlacedObstacles;
 
 /// Segments of one series, to the skin about the entry point and as many to the needle.
-pub const SIGHT_SEGMENTS: u32 = 512;
+pub(crate) const SIGHT_SEGMENTS: u32 = 512;
 /// Series of segments per person and stature, each evenly spread and shifted at random against the
 /// others: what they differ by says how far their mean may be off.
-pub const SIGHT_SERIES: u32 = 8;
+pub(crate) const SIGHT_SERIES: u32 = 8;
 /// Quantile of Student's t distribution for 95 % and seven degrees of freedom.
 const STUDENT_95: f64 = 2.365;
 /// Radius of the piece of skin about the entry point that is looked at, m.
-pub const ENTRY_DISC_RADIUS_M: f64 = 0.03;
+pub(crate) const ENTRY_DISC_RADIUS_M: f64 = 0.03;
 /// Height of that piece over the skin, m: a line to the skin itself would graze it.
 pub const ENTRY_DISC_HEIGHT_M: f64 = 2e-3;
 
@@ -119,7 +119,7 @@ fn series(
 /// Measures what a robot leaves of the sight of one person of one stature; `surroundings` is what is in
 /// the way without it.
 ///
-/// [`SIGHT_SERIES`] times [`SIGHT_SEGMENTS`] segments each to skin and needle, the same for every
+/// `SIGHT_SERIES` times `SIGHT_SEGMENTS` segments each to skin and needle, the same for every
 /// configuration, so that differences come from the arm alone. [`Sight::accuracy`] says how far the
 /// shares may be from the true ones.
 pub fn measure_sight(
