@@ -164,7 +164,7 @@ impl Components {
     }
 
     /// Number of the component that a voxel is of, if it is of one.
-    pub fn part_at(&self, [i, j, k]: [usize; 3]) -> Option<usize> {
+    pub(crate) fn part_at(&self, [i, j, k]: [usize; 3]) -> Option<usize> {
         let row = k * self.size[1] + j;
         let runs = &self.runs[self.row_starts[row] as usize..self.row_starts[row + 1] as usize];
         let at = runs.partition_point(|run| run.to as usize <= i);

@@ -164,12 +164,12 @@ impl DistanceField {
     }
 
     /// By how much a value may be rounded, at most: half a step of 16 bits.
-    pub fn rounding_m(&self) -> f64 {
+    pub(crate) fn rounding_m(&self) -> f64 {
         0.5 * self.cap_m / f64::from(STEPS)
     }
 
     /// Distance in m at a voxel of its box; none outside.
-    pub fn at_voxel(&self, voxel: [usize; 3]) -> Option<f64> {
+    pub(crate) fn at_voxel(&self, voxel: [usize; 3]) -> Option<f64> {
         self.within
             .contains(voxel)
             .then(|| self.metres(self.steps[self.offset(voxel)]))

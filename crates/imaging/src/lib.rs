@@ -35,18 +35,18 @@ pub use error::{ImagingError, Remark};
 pub use grid::{NotAGrid, VoxelGrid};
 pub use histogram::HuHistogram;
 pub use mask::{IndexBox, Mask};
-pub use morphology::{bridged, closed, dilated, eroded, opened};
+pub use morphology::{closed, dilated, eroded, opened};
 pub use orientation::{NoOrientation, Orientation};
 pub use reconstruct::{
-    LesionSize, MeasuredLesion, Progress, ReconstructOptions, Reconstruction, SURFACE_ERROR_M,
-    Surface, SurfaceSizes, reconstruct,
+    LesionSize, MeasuredLesion, Progress, ReconstructOptions, Reconstruction, Surface,
+    SurfaceSizes, reconstruct,
 };
 pub use resample::{Resampled, resample};
 pub use segment::{
-    BONE_LEVEL_HU, Body, Bone, FIRST_LESION, LUNG_LEVEL_HU, Label, LabelFacts, Lesion, LesionSeed,
-    Levels, Lung, Lungs, SKIN_LEVEL_HU, Segmentation, Side, grow_lesion, label_facts, label_map,
-    segment,
+    Body, Bone, FIRST_LESION, Label, LabelFacts, Lesion, LesionSeed, Levels, Lung, Lungs,
+    Segmentation, Side, label_map, segment,
 };
 pub use structures::{Structure, SurfaceTissue, structure_of};
-pub use surface::{Field, Level, SurfaceError, Values, simplify, surface_error, surface_net};
-pub use volume::{AIR_HU, LabelMap, Volume};
+pub use surface::{Field, Level, SurfaceError, Values};
+pub(crate) use volume::AIR_HU;
+pub use volume::{LabelMap, Volume};

@@ -106,7 +106,7 @@ impl Mask {
     }
 
     /// The same of a box of the grid, as a mask of the box.
-    pub fn of_box<T: Copy>(
+    pub(crate) fn of_box<T: Copy>(
         size: [usize; 3],
         values: &[T],
         within: &IndexBox,
@@ -160,7 +160,7 @@ impl Mask {
     }
 
     /// Puts the voxels `from..to` of a row in.
-    pub fn insert_run(&mut self, [from, to]: [usize; 2], j: usize, k: usize) {
+    pub(crate) fn insert_run(&mut self, [from, to]: [usize; 2], j: usize, k: usize) {
         if from >= to {
             return;
         }
@@ -214,7 +214,7 @@ impl Mask {
 
     /// All voxels that are not in it.
     #[must_use]
-    pub fn complement(&self) -> Self {
+    pub(crate) fn complement(&self) -> Self {
         let mut other = self.clone();
         let last = self.last_word();
         for row in other.words.chunks_exact_mut(self.words_per_row) {
@@ -252,7 +252,7 @@ impl Mask {
 
     /// The part within a box, as a mask of the box.
     #[must_use]
-    pub fn cropped(&self, within: &IndexBox) -> Self {
+    pub(crate) fn cropped(&self, within: &IndexBox) -> Self {
         let mut cropped = Self::empty(within.size());
         let (skip, shift) = (within.first[0] / 64, within.first[0] % 64);
         let last = cropped.last_word();
@@ -277,7 +277,7 @@ impl Mask {
     }
 
     /// Adds the voxels of a mask of a box of this grid.
-    pub fn unite_within(&mut self, within: &IndexBox, part: &Self) {
+    pub(crate) fn unite_within(&mut self, within: &IndexBox, part: &Self) {
         for (k, to_k) in (within.first[2]..=within.last[2]).enumerate() {
             for (j, to_j) in (within.first[1]..=within.last[1]).enumerate() {
                 for [from, to] in runs(part.row(j, k), part.size[0]) {

@@ -156,7 +156,7 @@ pub fn closed(mask: &Mask, radius_m: f64, spacing_m: [f64; 3]) -> Mask {
 
 /// Fills gaps of at most `gap` voxels between voxels of the mask along one axis.
 #[must_use]
-pub fn bridged(mask: &Mask, axis: usize, gap: usize) -> Mask {
+pub(crate) fn bridged(mask: &Mask, axis: usize, gap: usize) -> Mask {
     let [nx, ny, nz] = mask.size();
     let mut out = mask.clone();
     match axis {

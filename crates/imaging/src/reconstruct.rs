@@ -66,7 +66,7 @@ impl Default for SurfaceSizes {
 const MEAN_ERROR_M: f64 = 0.12e-3;
 
 /// Distance from the voxels' surface that 99 % of it keep to.
-pub const SURFACE_ERROR_M: f64 = 0.25e-3;
+pub(crate) const SURFACE_ERROR_M: f64 = 0.25e-3;
 
 /// Cells of skin and lungs: several voxels where these are finer. Vertices lie on the voxels' surface all the same.
 const LARGE_CELL_M: f64 = 2.05e-3;

@@ -3,7 +3,7 @@
 use crate::VoxelGrid;
 
 /// Of air, and of what a scanner did not see: padding outside its circle.
-pub const AIR_HU: i16 = -1000;
+pub(crate) const AIR_HU: i16 = -1000;
 
 /// A CT volume.
 #[derive(Debug, Clone, PartialEq)]

@@ -147,7 +147,7 @@ struct Normal {
 }
 
 /// Fits a candidate; why it is no marker where it is none.
-pub fn localise(
+pub(crate) fn localise(
     scan: &Scan<'_>,
     model: &MarkerModel,
     sphere: &BlurredSphere,

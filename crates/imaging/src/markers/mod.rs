@@ -47,7 +47,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{ImagingError, Remark, Volume};
 
-pub use noise::{Noise, measure_noise};
+pub use noise::Noise;
+pub(crate) use noise::measure_noise;
 
 /// What is dense in a marker.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

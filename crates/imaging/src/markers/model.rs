@@ -9,7 +9,7 @@ use super::edge::Edge;
 use super::sphere::BlurredSphere;
 
 /// Unknowns.
-pub const UNKNOWNS: usize = 15;
+pub(crate) const UNKNOWNS: usize = 15;
 
 /// One value per unknown.
 pub type Unknowns = SVector<f64, UNKNOWNS>;
@@ -17,25 +17,25 @@ pub type Unknowns = SVector<f64, UNKNOWNS>;
 /// Place of an unknown in [`Unknowns`]. The marker's centre is the first three.
 pub mod unknown {
     /// Height of the centre over the skin, mm.
-    pub const HEIGHT: usize = 3;
+    pub(crate) const HEIGHT: usize = 3;
     /// Tilt of the skin's normal along two directions of the skin.
-    pub const TILT: usize = 4;
+    pub(crate) const TILT: usize = 4;
     /// Curvature of the skin: along the first direction, mixed, along the second, 1/mm.
-    pub const CURVATURE: usize = 6;
+    pub(crate) const CURVATURE: usize = 6;
     /// Tissue under the skin.
-    pub const TISSUE: usize = 9;
+    pub(crate) const TISSUE: usize = 9;
     /// What is dense in the marker.
-    pub const DENSE: usize = 10;
+    pub(crate) const DENSE: usize = 10;
     /// Two layers of the holder.
-    pub const LAYER: usize = 11;
+    pub(crate) const LAYER: usize = 11;
     /// Radius over that of the model, mm.
-    pub const RADIUS: usize = 13;
+    pub(crate) const RADIUS: usize = 13;
     /// Standard deviation of the blur over the assumed one, mm.
-    pub const BLUR: usize = 14;
+    pub(crate) const BLUR: usize = 14;
 }
 
 /// Air, thousands of HU.
-pub const AIR: f64 = -1.0;
+pub(crate) const AIR: f64 = -1.0;
 
 /// Everything about a marker in a scan that is the same for all of them.
 #[derive(Debug)]

@@ -59,7 +59,7 @@ impl Noise {
     }
 
     /// Voxels that tell as much as one without correlation.
-    pub fn voxels_per_value(&self) -> f64 {
+    pub(crate) fn voxels_per_value(&self) -> f64 {
         let all = |plane: &[[f64; WIDTH]; WIDTH]| plane.iter().flatten().sum::<f64>();
         let others: f64 = self.correlation.iter().skip(1).map(all).sum();
         (self.correlation.first().map_or(1.0, all) + 2.0 * others).max(1.0)
@@ -71,7 +71,7 @@ impl Noise {
 /// Planes are taken out of the patches, so that slow changes of tissue do not count, and their products are put right for
 /// it. Patches with structure have a larger variance: the correlation is that of the half with the smaller one. It is
 /// the slice below that chooses: chosen by its own variance, noise would seem weaker and less correlated than it is.
-pub fn measure_noise(volume: &Volume) -> Option<Noise> {
+pub(crate) fn measure_noise(volume: &Volume) -> Option<Noise> {
     let size = volume.grid.size();
     if size[0] < PATCH || size[1] < PATCH {
         return None;

@@ -9,7 +9,7 @@ use crate::volume::{AIR_HU, Volume};
 use super::{Scan, below, side_in_words};
 
 /// Between air (-1000) and skin (+40), where the blur of the scanner leaves the surface. Half-integer: no voxel is on it.
-pub const SKIN_LEVEL_HU: f64 = -479.5;
+pub(crate) const SKIN_LEVEL_HU: f64 = -479.5;
 
 /// What is thinner than twice this is cut off: the shell of a bed, tubes, blankets.
 const BED_HALF_THICKNESS_M: f64 = 3e-3;

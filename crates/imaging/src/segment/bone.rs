@@ -11,7 +11,7 @@ use super::body::Body;
 use super::lungs::Lungs;
 
 /// Denser than soft tissue and blood without contrast medium.
-pub const BONE_LEVEL_HU: f64 = 190.5;
+pub(crate) const BONE_LEVEL_HU: f64 = 190.5;
 
 /// What is bone has some voxels that are denser than this: hysteresis against noise.
 const SURE_HU: i16 = 280;

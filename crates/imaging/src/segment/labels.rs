@@ -136,7 +136,7 @@ pub fn paint(map: &mut LabelMap, within: &IndexBox, mask: &Mask, label: u16) {
 }
 
 /// Voxels and volume of every label that a map names.
-pub fn label_facts(map: &LabelMap) -> Vec<LabelFacts> {
+pub(crate) fn label_facts(map: &LabelMap) -> Vec<LabelFacts> {
     let mut counts = vec![0_usize; 1 << 16];
     // Neighbours mostly have the same label: these are counted at once.
     for some in map.labels.chunks(64) {

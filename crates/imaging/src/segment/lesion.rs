@@ -81,7 +81,7 @@ pub struct Lesion {
 ///
 /// # Errors
 /// If the point is outside the body or in air, or nothing sets the lesion apart from what is around it.
-pub fn grow_lesion(
+pub(crate) fn grow_lesion(
     volume: &Volume,
     found: &Segmentation,
     seed: &LesionSeed,

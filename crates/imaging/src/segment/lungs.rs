@@ -9,7 +9,7 @@ use super::body::Body;
 use super::{Scan, side_in_words};
 
 /// Between lung (-850) and the soft tissue around it (+40). Half-integer: no voxel is on it.
-pub const LUNG_LEVEL_HU: f64 = -400.5;
+pub(crate) const LUNG_LEVEL_HU: f64 = -400.5;
 
 /// A lung has at least so much air.
 const LEAST_LUNG_L: f64 = 0.3;

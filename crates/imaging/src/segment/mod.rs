@@ -13,11 +13,16 @@ use crate::mask::{IndexBox, Mask};
 use crate::spacing::{orthogonal, whole};
 use crate::volume::Volume;
 
-pub use body::{Body, SKIN_LEVEL_HU};
-pub use bone::{BONE_LEVEL_HU, Bone};
-pub use labels::{FIRST_LESION, Label, LabelFacts, label_facts, label_map, paint};
-pub use lesion::{Lesion, LesionSeed, grow_lesion};
-pub use lungs::{LUNG_LEVEL_HU, Lung, Lungs, Side};
+pub use body::Body;
+pub(crate) use body::SKIN_LEVEL_HU;
+pub(crate) use bone::BONE_LEVEL_HU;
+pub use bone::Bone;
+pub(crate) use labels::label_facts;
+pub use labels::{FIRST_LESION, Label, LabelFacts, label_map, paint};
+pub(crate) use lesion::grow_lesion;
+pub use lesion::{Lesion, LesionSeed};
+pub(crate) use lungs::LUNG_LEVEL_HU;
+pub use lungs::{Lung, Lungs, Side};
 
 /// What is in a volume.
 #[derive(Debug, Clone)]

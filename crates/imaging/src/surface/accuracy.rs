@@ -27,7 +27,7 @@ pub struct SurfaceError {
 }
 
 /// Measures a surface against the field that it was made of. None if the field has no surface.
-pub fn surface_error(
+pub(crate) fn surface_error(
     field: &Field<'_>,
     grid: &VoxelGrid,
     surface: &SurfaceIndex,

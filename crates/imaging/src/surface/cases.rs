@@ -4,10 +4,10 @@ use std::sync::OnceLock;
 
 /// Corners count x, y, z from the lowest bit. An edge runs along an axis from a corner: `axis * 4 + u + 2 v`, with u and
 /// v the corner's places along the next two axes.
-pub const EDGES: usize = 12;
+pub(crate) const EDGES: usize = 12;
 
 /// No sheet crosses an edge.
-pub const NO_SHEET: u8 = u8::MAX;
+pub(crate) const NO_SHEET: u8 = u8::MAX;
 
 /// The sheets of a cell.
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +42,11 @@ fn face_corners(axis: usize, side: usize) -> [usize; 4] {
 
 /// On a face whose corners are inside across a diagonal only, the pairs of edges that one sheet each crosses: those
 /// beside either corner inside. Both cells at the face see the same. None for other faces.
-pub fn pairs_on_face(corners_inside: u8, axis: usize, side: usize) -> Option<[[usize; 2]; 2]> {
+pub(crate) fn pairs_on_face(
+    corners_inside: u8,
+    axis: usize,
+    side: usize,
+) -> Option<[[usize; 2]; 2]> {
     let corners = face_corners(axis, side);
     let inside = corners.map(|corner| corners_inside >> corner & 1 == 1);
     let first = match inside {

@@ -156,7 +156,7 @@ impl Field<'_> {
 
     /// Positive inside, negative outside, 0 on the surface; never 0 at a voxel. Beyond the volume's end the solid is
     /// mirrored in sign, which closes it half a voxel beyond the last one.
-    pub fn at_voxel(&self, at: [isize; 3]) -> f32 {
+    pub(crate) fn at_voxel(&self, at: [isize; 3]) -> f32 {
         let size = self.grid_size();
         let nearest: [isize; 3] = std::array::from_fn(|axis| {
             let last = size[axis].min(isize::MAX as usize).cast_signed() - 1;
@@ -231,7 +231,7 @@ impl Field<'_> {
 
     /// Visits the voxels that the surface parts from the next one along an axis, with the axis; also those that the
     /// volume's end or that of the box cuts.
-    pub fn for_each_crossed_line(&self, mut visit: impl FnMut([isize; 3], usize)) {
+    pub(crate) fn for_each_crossed_line(&self, mut visit: impl FnMut([isize; 3], usize)) {
         let [_, ny, nz] = self.inside.size();
         let first = self.bounds.first.map(usize::cast_signed);
         let empty = vec![0; self.inside.words_per_row()];

@@ -28,7 +28,7 @@ const LEAST_VALUES: usize = 20;
 /// Levels of a structure that is denser than what is around it, from the values inside it and around it.
 ///
 /// `around` says which voxels count as its surroundings (soft tissue, not air). `None` if there is not enough of either.
-pub fn local_level(
+pub(crate) fn local_level(
     hu: &[i16],
     grid: &VoxelGrid,
     inside: &Mask,

@@ -12,7 +12,7 @@ const MOST: f64 = 0.25;
 /// Values at the middles of thick slices of which the line from one to the next has the measured means over the
 /// thickness, to first order: a line's mean over thickness T about a middle adds T / (8 step) of the second difference
 /// to the value there. Only within a box; none if slices are thin.
-pub fn at_middles(volume: &Volume, within: &IndexBox) -> Option<Vec<i16>> {
+pub(crate) fn at_middles(volume: &Volume, within: &IndexBox) -> Option<Vec<i16>> {
     let [_, _, step_m] = volume.grid.spacing_m();
     let thickness_m = volume.slice_thickness_m.unwrap_or(step_m);
     let [nx, ny, nz] = volume.grid.size();

@@ -9,12 +9,14 @@ mod nets;
 mod simplify;
 mod sound;
 
-pub use accuracy::{SurfaceError, surface_error};
+pub use accuracy::SurfaceError;
+pub(crate) use accuracy::surface_error;
 pub use field::{Field, Level, Values};
-pub use local_level::{local_level, refine};
-pub use middles::at_middles;
-pub use nets::surface_net;
-pub use simplify::simplify;
+pub(crate) use local_level::local_level;
+pub use local_level::refine;
+pub(crate) use middles::at_middles;
+pub(crate) use nets::surface_net;
+pub(crate) use simplify::simplify;
 pub use sound::sound;
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ const NEAR_M: f64 = 1e-6;
 /// The surface of a field as a closed manifold in `ct`, triangles counter-clockwise seen from outside.
 ///
 /// `stride` is the number of voxels along each axis of a cell; details between are smoothed over.
-pub fn surface_net(field: &Field<'_>, grid: &VoxelGrid, stride: [usize; 3]) -> TriangleMesh {
+pub(crate) fn surface_net(field: &Field<'_>, grid: &VoxelGrid, stride: [usize; 3]) -> TriangleMesh {
     let mut net = Net::new(field, grid, stride);
     net.build();
     net.mesh

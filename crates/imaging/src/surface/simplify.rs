@@ -28,7 +28,7 @@ const STALLED: usize = 3;
 
 /// Removes triangles until at most `target` are left, as long as no vertex leaves its planes by more than `error_m` on
 /// average.
-pub fn simplify(mesh: &TriangleMesh, target: usize, error_m: f64) -> TriangleMesh {
+pub(crate) fn simplify(mesh: &TriangleMesh, target: usize, error_m: f64) -> TriangleMesh {
     let mut work = Collapse::new(mesh, error_m);
     let mut stalled = 0;
     while work.alive > target && stalled < STALLED {

@@ -42,7 +42,7 @@ impl Blur {
     }
 
     /// Cells that a row of pixels needs.
-    pub fn cells_for(&self, pixels: usize) -> usize {
+    pub(crate) fn cells_for(&self, pixels: usize) -> usize {
         (pixels - 1) * self.cells + self.taps.len()
     }
 

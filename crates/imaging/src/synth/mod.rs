@@ -123,7 +123,7 @@ pub fn label(
 }
 
 /// Whether a pixel is outside the circle within an image: columns and rows of the image, and the pixel's.
-pub fn is_outside_circle([columns, rows]: [usize; 2], [i, j]: [usize; 2]) -> bool {
+pub(crate) fn is_outside_circle([columns, rows]: [usize; 2], [i, j]: [usize; 2]) -> bool {
     Circle::new([columns, rows]).share(i, j) > 1.0
 }
 

@@ -160,7 +160,7 @@ impl Streaks {
 
 impl Scanner {
     /// What 12-bit scanners store.
-    pub const RANGE_HU: [i16; 2] = [-1024, 3071];
+    pub(crate) const RANGE_HU: [i16; 2] = [-1024, 3071];
 
     /// With blur, noise, clipping and circle; without overshoot and streaks.
     pub fn new(slice_thickness_m: f64, kernel: Kernel) -> Self {

@@ -211,7 +211,12 @@ pub struct Trial {
 }
 
 /// A bare ball on curved skin.
-pub fn ball_on_skin(diameter: f64, hu: f64, skin_radius: f64, random: &mut NormalPairs) -> Trial {
+pub(crate) fn ball_on_skin(
+    diameter: f64,
+    hu: f64,
+    skin_radius: f64,
+    random: &mut NormalPairs,
+) -> Trial {
     let truth = Vector3::from_fn(|_, _| random.uniform(-0.5, 0.5))
         .component_mul(&Vector3::new(0.7, 0.7, 5.0));
     // Any direction, but for the top of the head.

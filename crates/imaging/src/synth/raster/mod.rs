@@ -88,7 +88,7 @@ impl Contents {
     }
 
     /// Label of what is beneath all that may cut the box.
-    pub fn beneath_label(&self) -> u16 {
+    pub(crate) fn beneath_label(&self) -> u16 {
         self.beneath.label
     }
 }
@@ -122,12 +122,12 @@ impl Raster {
     }
 
     /// Where a point of `ct` is in the frame of the slices.
-    pub fn in_frame(&self, point: &Point3<f64>) -> Vector3<f64> {
+    pub(crate) fn in_frame(&self, point: &Point3<f64>) -> Vector3<f64> {
         self.frame_from_ct * point.coords
     }
 
     /// What may be in a box, of all that there is.
-    pub fn all_in(&self, cell: &Cell, stack: &mut Stack) -> Contents {
+    pub(crate) fn all_in(&self, cell: &Cell, stack: &mut Stack) -> Contents {
         stack.candidates.clear();
         stack.planes.clear();
         let (low, high) = (cell.centre - cell.half, cell.centre + cell.half);
