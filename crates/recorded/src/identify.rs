@@ -50,7 +50,7 @@ mod coarsest {
     /// Centre of a load, m.
     pub const CENTRE: (f64, f64) = (0.01, 0.1);
     /// Inertia of a rotor, kg m^2.
-    pub const ROTOR: (f64, f64) = (0.005, 0.1);
+    pub(crate) const ROTOR: (f64, f64) = (0.005, 0.1);
     /// Gravity, m/s^2.
     pub const GRAVITY: (f64, f64) = (0.02, 0.0);
     /// Sliding friction, N m.

@@ -114,7 +114,7 @@ impl Quantity {
     }
 
     /// Whether its numbers are angles, or angles per time.
-    pub fn is_angular(self) -> bool {
+    pub(crate) fn is_angular(self) -> bool {
         self.numbers() == Numbers::Angles
     }
 

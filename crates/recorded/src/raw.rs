@@ -122,7 +122,7 @@ impl RawLog {
     }
 
     /// Ends a row.
-    pub fn end_row(&mut self, line: usize, cut: Option<Cut>) {
+    pub(crate) fn end_row(&mut self, line: usize, cut: Option<Cut>) {
         self.cut.push(cut);
         self.line.push(u32::try_from(line).unwrap_or(u32::MAX));
     }

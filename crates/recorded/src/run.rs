@@ -125,7 +125,7 @@ impl RecordedRun {
     }
 
     /// Pose of the tool's point in `base` at a row, if the log has it.
-    pub fn base_from_tcp(&self, row: usize) -> Option<Pose> {
+    pub(crate) fn base_from_tcp(&self, row: usize) -> Option<Pose> {
         self.tcp.as_ref().map(|poses| {
             let [x, y, z, rx, ry, rz] = poses[row];
             pose_from_rotation_vector(Vector3::new(x, y, z), Vector3::new(rx, ry, rz))

@@ -9,23 +9,23 @@ pub(crate) const TERMS: usize = 21;
 /// What the terms are, by their places. Torques in N m, of gravity per m/s^2.
 pub(crate) mod term {
     /// The torque that is to be explained.
-    pub const TORQUE: usize = 0;
+    pub(crate) const TORQUE: usize = 0;
     /// Inertia of the links as points at their centres of mass.
     pub const LINKS: usize = 1;
     /// Inertia of the links about their centres.
-    pub const TENSORS: usize = 2;
+    pub(crate) const TENSORS: usize = 2;
     /// Gravity on the links.
-    pub const LINKS_GRAVITY: usize = 3;
+    pub(crate) const LINKS_GRAVITY: usize = 3;
     /// Of a load, per kg and kg m in the flange's frame: mass, then mass times centre.
     pub const LOAD: usize = 4;
     /// Gravity on it, in the same order.
-    pub const LOAD_GRAVITY: usize = 8;
+    pub(crate) const LOAD_GRAVITY: usize = 8;
     /// Its inertia about the flange's origin, per kg m^2: xx, yy, zz, xy, xz, yz.
-    pub const LOAD_INERTIA: usize = 12;
+    pub(crate) const LOAD_INERTIA: usize = 12;
     /// The joint's acceleration.
-    pub const ACCELERATION: usize = 18;
+    pub(crate) const ACCELERATION: usize = 18;
     /// The joint's speed.
-    pub const SPEED: usize = 19;
+    pub(crate) const SPEED: usize = 19;
     /// The sign of its speed; 0 at rest.
     pub const DIRECTION: usize = 20;
 }

@@ -131,7 +131,7 @@ impl Data {
     }
 
     /// Root mean square of what rotors, gravity and loads that are given leave of the torques, N m.
-    pub fn rms_by(
+    pub(crate) fn rms_by(
         &self,
         rotors: &[f64; JOINT_COUNT],
         gravity_m_s2: f64,
@@ -389,7 +389,7 @@ impl Fit {
 
     /// How unlikely the run is by this fit: the sum over rows of the logarithm of their joint's error.
     /// Models with the same number of parameters compare by it.
-    pub fn unlikelihood(&self, data: &Data) -> f64 {
+    pub(crate) fn unlikelihood(&self, data: &Data) -> f64 {
         let squares = self.squares(&data.sum(|_| true));
         let each = squares.iter().filter(|(_, rows)| *rows > 0.0);
         each.map(|(sum, rows)| 0.5 * rows * libm::log(sum / rows + DIGITS_NM * DIGITS_NM))
