@@ -239,7 +239,7 @@ impl View {
     }
 
     /// A point of the world in the eye frame, m.
-    pub fn eye_point(&self, world_m: &Point3<f64>) -> Vector3<f64> {
+    pub(crate) fn eye_point(&self, world_m: &Point3<f64>) -> Vector3<f64> {
         self.eye_from_world * (world_m - self.eye_m)
     }
 
@@ -288,7 +288,7 @@ impl View {
     }
 
     /// Inverse of [`View::depth_m`].
-    pub fn nearness(&self, depth_m: f64) -> f64 {
+    pub(crate) fn nearness(&self, depth_m: f64) -> f64 {
         if self.perspective {
             1.0 / depth_m
         } else {
@@ -297,7 +297,7 @@ impl View {
     }
 
     /// What geometry is clipped to: in front of the eye and within [`GUARD`] pictures.
-    pub fn guards(&self) -> [HalfSpace; 5] {
+    pub(crate) fn guards(&self) -> [HalfSpace; 5] {
         let half_space = |x: f64, y: f64, side_px: f64| {
             let slope = GUARD * side_px / self.scale_px;
             let normal = Vector3::new(x, y, if self.perspective { slope } else { 0.0 });

@@ -31,7 +31,7 @@ impl Material {
         }
     }
 
-    pub fn is_opaque(&self) -> bool {
+    pub(crate) fn is_opaque(&self) -> bool {
         self.opacity >= OPAQUE
     }
 }

@@ -85,7 +85,7 @@ pub struct Floor {
 
 impl Scene {
     /// Every finite vertex and line end, in the world, m: what [`Camera::framing`](crate::Camera::framing) is to show.
-    pub fn points_m(&self) -> Vec<Point3<f64>> {
+    pub(crate) fn points_m(&self) -> Vec<Point3<f64>> {
         let vertices = self.surfaces.iter().flat_map(|surface| {
             let place = |vertex_m: &Point3<f64>| surface.world_from_surface * vertex_m;
             surface.mesh.vertices_m.iter().map(place)

@@ -18,7 +18,7 @@ impl TextSize {
     pub const LARGE: Self = Self(RasterHeight::Size24);
 
     /// The size for a picture of the given height: about 45 lines, as far as the font allows.
-    pub fn for_picture(height_px: usize) -> Self {
+    pub(crate) fn for_picture(height_px: usize) -> Self {
         Self(match height_px {
             0..700 => RasterHeight::Size16,
             700..1000 => RasterHeight::Size20,
