@@ -107,7 +107,7 @@ impl Case {
     ///
     /// # Errors
     /// What `make` says; it is asked again the next time.
-    pub fn run_desk<E>(&self, make: impl FnOnce() -> Result<Desk, E>) -> Result<&Desk, E> {
+    pub(crate) fn run_desk<E>(&self, make: impl FnOnce() -> Result<Desk, E>) -> Result<&Desk, E> {
         if let Some(known) = self.run_desk.get() {
             return Ok(known);
         }
@@ -136,7 +136,7 @@ impl Case {
     }
 
     /// Offset of the voxel that an index is in; none outside the volume.
-    pub fn nearest_voxel(&self, index: &Point3<f64>) -> Option<usize> {
+    pub(crate) fn nearest_voxel(&self, index: &Point3<f64>) -> Option<usize> {
         let size = self.grid().size();
         let mut voxel = [0; 3];
         for axis in 0..3 {
@@ -157,7 +157,7 @@ impl Case {
     }
 
     /// What a label is called; none of what is outside of everything.
-    pub fn label_name(&self, label: u16) -> Option<String> {
+    pub(crate) fn label_name(&self, label: u16) -> Option<String> {
         if label == 0 {
             return None;
         }

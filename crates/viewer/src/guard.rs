@@ -84,7 +84,7 @@ fn forbidden(message: &str) -> Problem {
 ///
 /// # Errors
 /// 401 with a sentence.
-pub fn check_token(headers: &HeaderMap, token: &Token) -> Result<(), Problem> {
+pub(crate) fn check_token(headers: &HeaderMap, token: &Token) -> Result<(), Problem> {
     let given = headers.get(header::AUTHORIZATION);
     let given = given.and_then(|value| value.to_str().ok());
     let given = given.and_then(|text| text.strip_prefix("Bearer "));
@@ -99,13 +99,13 @@ pub fn check_token(headers: &HeaderMap, token: &Token) -> Result<(), Problem> {
 }
 
 /// Name of the cookie that lets a browser open results, which a link cannot give a token.
-pub const COOKIE: &str = "needlebench_results";
+pub(crate) const COOKIE: &str = "needlebench_results";
 
 /// Refuses who has not the cookie.
 ///
 /// # Errors
 /// 401 with a sentence.
-pub fn check_cookie(headers: &HeaderMap, token: &Token) -> Result<(), Problem> {
+pub(crate) fn check_cookie(headers: &HeaderMap, token: &Token) -> Result<(), Problem> {
     let cookies = headers.get_all(header::COOKIE).iter();
     let cookies = cookies.filter_map(|value| value.to_str().ok());
     let mut pairs = cookies

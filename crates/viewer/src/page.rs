@@ -21,7 +21,7 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; i
      connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// A report brings its scripts along; it asks nobody for anything.
-pub const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; \
+pub(crate) const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; \
      style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// A file of the page; none of another name.
@@ -53,7 +53,7 @@ pub fn file(name: &str) -> Option<Response> {
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// What every answer has.
-pub fn guarded(mut response: Response) -> Response {
+pub(crate) fn guarded(mut response: Response) -> Response {
     let headers = response.headers_mut();
     let mut put = |name, value| {
         headers

@@ -12,7 +12,7 @@ use crate::live::{Aim, Refusal, needle};
 use needlebench_bench::ct::SCENARIO_FILE;
 
 /// Its name, unless somebody gives it another.
-pub const PLAN_FILE: &str = "planned.toml";
+pub(crate) const PLAN_FILE: &str = "planned.toml";
 
 /// Decimals of places, mm.
 const DECIMALS: usize = 6;

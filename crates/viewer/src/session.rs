@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::live::{Aim, EntryAim, TargetAim};
 
 /// Its file.
-pub const SESSION_FILE: &str = "session.toml";
+pub(crate) const SESSION_FILE: &str = "session.toml";
 
 /// Version of the file's layout.
 const SCHEMA_VERSION: u32 = 1;

@@ -58,7 +58,7 @@ impl Turns {
     ///
     /// # Errors
     /// As [`Turns::run`].
-    pub async fn run_until<T: Send + 'static>(
+    pub(crate) async fn run_until<T: Send + 'static>(
         &self,
         turn: Option<(String, u64)>,
         work: impl FnOnce(&AtomicBool) -> T + Send + 'static,
