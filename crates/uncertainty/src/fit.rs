@@ -59,7 +59,7 @@ pub(crate) struct FitError {
 
 impl FitError {
     /// By markers that are seen as well as their localisation says.
-    pub fn of_localisation(markers: &Markers) -> Result<Self, RegistrationError> {
+    pub(crate) fn of_localisation(markers: &Markers) -> Result<Self, RegistrationError> {
         match &markers.localisation {
             Localisation::Assumed { rms_m } => Self::unweighted(markers, *rms_m),
             Localisation::Measured { covariances_m2 } => {
@@ -69,7 +69,7 @@ impl FitError {
     }
 
     /// By markers that have moved by this standard deviation along each axis, of which the fit knows nothing.
-    pub fn of_shifts(markers: &Markers, shift_m: f64) -> Result<Self, RegistrationError> {
+    pub(crate) fn of_shifts(markers: &Markers, shift_m: f64) -> Result<Self, RegistrationError> {
         match &markers.localisation {
             Localisation::Assumed { .. } => Self::unweighted(markers, shift_m * 3.0_f64.sqrt()),
             Localisation::Measured { covariances_m2 } => {
@@ -154,14 +154,14 @@ impl FitError {
     }
 
     /// Covariance of the error at a point (target registration error), m^2.
-    pub fn covariance_at(&self, point: &Point3<f64>) -> Matrix3<f64> {
+    pub(crate) fn covariance_at(&self, point: &Point3<f64>) -> Matrix3<f64> {
         displacement_covariance(&self.covariance, &(point - self.about_m))
     }
 
     /// Mean of where a point is planned, less where it is by the inverse of the fit; of second order, m.
     ///
     /// The inverse moves a point at `r` by `-t - w x r + w x (w x r) / 2 + w x t`.
-    pub fn mean_at(&self, point: &Point3<f64>) -> Vector3<f64> {
+    pub(crate) fn mean_at(&self, point: &Point3<f64>) -> Vector3<f64> {
         let arm = point - self.about_m;
         let [slid, turned] = [0, 3].map(|at| self.mean.fixed_rows::<3>(at).into_owned());
         let shared = self.covariance.fixed_view::<3, 3>(3, 0);
