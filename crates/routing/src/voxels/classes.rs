@@ -174,7 +174,7 @@ impl Classes {
         u8::try_from(index).unwrap_or(u8::MAX)
     }
 
-    pub fn of_label(&self, label: u16) -> u8 {
+    pub(crate) fn of_label(&self, label: u16) -> u8 {
         self.of_label[usize::from(label)]
     }
 
@@ -187,12 +187,12 @@ impl Classes {
     }
 
     /// Number of a lung.
-    pub fn lung_called(&self, name: &str) -> Option<u8> {
+    pub(crate) fn lung_called(&self, name: &str) -> Option<u8> {
         let index = self.lungs.iter().position(|lung| lung == name)?;
         u8::try_from(index).ok()
     }
 
-    pub fn lung_name(&self, lung: u8) -> &str {
+    pub(crate) fn lung_name(&self, lung: u8) -> &str {
         &self.lungs[usize::from(lung)]
     }
 }
