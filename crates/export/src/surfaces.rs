@@ -109,7 +109,7 @@ impl Surfaces {
     }
 
     /// A patient, from the phantom's frame.
-    pub fn add_phantom(&mut self, placed: &PlacedPhantom, place: &Pose) {
+    pub(crate) fn add_phantom(&mut self, placed: &PlacedPhantom, place: &Pose) {
         for part in placed.phantom.parts.iter().chain(&placed.limbs) {
             self.add_tissue(part, place);
         }
