@@ -35,7 +35,7 @@ pub(crate) struct Adjudicated {
 
 impl Adjudicated {
     /// The engines' differences of one configuration, without an inquiry.
-    pub fn without_referee(setup: &Setup<'_>, goal: usize, runs: &[EngineRun]) -> Self {
+    pub(crate) fn without_referee(setup: &Setup<'_>, goal: usize, runs: &[EngineRun]) -> Self {
         let recordings: Vec<&Recording> = runs.iter().map(|run| &run.recording).collect();
         let envelope = &setup.resolved.scenario.engines.envelope;
         let (cell, goal) = (setup.real.cell(), setup.real.goal(goal));
@@ -105,7 +105,7 @@ type Verdict = (RefereeReport, Vec<PairConvergence>);
 impl Adjudicator<'_> {
     /// Judges every configuration that several engines simulated, and calls the referee where asked
     /// for or where the engines differ by more than they may.
-    pub fn judge_all(&self, control: &Control<'_>) -> Adjudications {
+    pub(crate) fn judge_all(&self, control: &Control<'_>) -> Adjudications {
         let mut found = Adjudications {
             by_goal: Vec::new(),
             identity: None,

@@ -16,12 +16,12 @@ pub const PROGRAM_VERSION: &str = concat!(
 );
 
 /// Git revision of the build, with `-dirty` where it was changed; `unknown` outside git. For people: what tells programs
-/// apart is [`SOURCE_SHA256`].
+/// apart is `SOURCE_SHA256`.
 pub const GIT_REVISION: &str = env!("NEEDLEBENCH_GIT_REVISION");
 
 /// SHA-256 of all sources that results depend on, with the versions of all libraries and the compiler. Programs of the
 /// same hash compute the same bytes, whatever revision they were built from.
-pub const SOURCE_SHA256: &str = env!("NEEDLEBENCH_SOURCE_SHA256");
+pub(crate) const SOURCE_SHA256: &str = env!("NEEDLEBENCH_SOURCE_SHA256");
 
 /// How numbers are rounded: what the bytes of results depend on beside the program. No instruction of one CPU and not of
 /// another does anything else: elementary functions are those of `libm`, products are fused where vectors of any width

@@ -98,7 +98,7 @@ impl<'a> RealCell<'a> {
     }
 
     /// Whether anything is imperfect.
-    pub fn is_imperfect(&self) -> bool {
+    pub(crate) fn is_imperfect(&self) -> bool {
         self.imperfect.is_some()
     }
 
@@ -132,7 +132,7 @@ impl<'a> RealCell<'a> {
     }
 
     /// Takes off the proven bounds what the skin may come nearer in another phase of the breath.
-    pub fn allow_for_breath(&self, series: &mut ClearanceSeries) {
+    pub(crate) fn allow_for_breath(&self, series: &mut ClearanceSeries) {
         let Some(Imperfect { truth, .. }) = &self.imperfect else {
             return;
         };
@@ -179,7 +179,7 @@ pub struct PredictedNeedle {
 ///
 /// # Errors
 /// [`RegistrationError`] for markers that determine no pose.
-pub fn drawn_truth(resolved: &ResolvedScenario) -> Option<Result<Truth, RegistrationError>> {
+pub(crate) fn drawn_truth(resolved: &ResolvedScenario) -> Option<Result<Truth, RegistrationError>> {
     let imperfections = resolved.imperfections.as_ref()?;
     let mut random = SplitMix64::new(resolved.scenario.seed ^ STREAM);
     let layout = Layout::new(imperfections);

@@ -68,7 +68,7 @@ impl<'a> Setup<'a> {
     }
 
     /// How motions are made.
-    pub fn motion_settings(&self) -> MotionSettings<'_> {
+    pub(crate) fn motion_settings(&self) -> MotionSettings<'_> {
         MotionSettings::new(&self.resolved.scenario.engines)
     }
 }

@@ -68,7 +68,7 @@ pub(crate) struct FailedMotion {
 
 impl Simulation<'_> {
     /// Makes all motions in one engine.
-    pub fn run_in(
+    pub(crate) fn run_in(
         &self,
         pool: &EnginePool,
         engine: &'static dyn Engine,
@@ -166,7 +166,7 @@ impl Simulation<'_> {
 impl SimulatedMotions {
     /// Simulated time over the wall-clock time of all motions of an engine, with everything that
     /// belongs to them: building the plants, control, recording and the certified clearance.
-    pub fn real_time_factor(&self) -> Option<f64> {
+    pub(crate) fn real_time_factor(&self) -> Option<f64> {
         let durations_s = self
             .runs
             .iter()

@@ -13,13 +13,14 @@ use needlebench_evaluation::StoredReport;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-pub use verification::{VERIFYING_TESTS, VerifyingTest};
+pub(crate) use verification::VERIFYING_TESTS;
+pub use verification::VerifyingTest;
 
 /// Version of the keys of [`Credibility`].
-pub const CREDIBILITY_VERSION: u32 = 1;
+pub(crate) const CREDIBILITY_VERSION: u32 = 1;
 
 /// What no such document does.
-pub const CLAIM: &str = "This document claims no conformity with any standard or guidance. It has the frame of \
+pub(crate) const CLAIM: &str = "This document claims no conformity with any standard or guidance. It has the frame of \
     ASME V&V 40 - question of interest, context of use, model risk, verification, validation, applicability - and \
     collects evidence in it. What the program knows is filled in by it; what people have to judge is theirs, and \
     \"not stated\" where nobody said it.";
@@ -78,7 +79,7 @@ pub struct Comparison {
 
 impl Comparison {
     /// Whether it holds the model against anything that was measured.
-    pub fn is_comparator(&self) -> bool {
+    pub(crate) fn is_comparator(&self) -> bool {
         self.simulated_log != Some(true)
             && (self.held_out_m.is_some()
                 || self.held_out_moment_rms_nm.is_some()

@@ -30,7 +30,7 @@ const fn test(
 }
 
 /// The tests, by what they are of. They are run before every change of the program, and not by a run.
-pub const VERIFYING_TESTS: [VerifyingTest; 16] = [
+pub(crate) const VERIFYING_TESTS: [VerifyingTest; 16] = [
     test(
         "free motion in both engines and the referee",
         "the pendulum in elliptic functions",

@@ -83,7 +83,11 @@ const AIRWAY_WALL_M: f64 = 1e-3;
 ///
 /// Later parts lie over earlier ones: skin, fat, muscle, organs, vessels, airways, bones, lesions, markers. Whole bones come before
 /// their insides, so that pieces of a rib that overlap have one shell.
-pub fn phantom_scene(phantom: &Phantom, limbs: &[PhantomPart], materials: &Materials) -> Scene {
+pub(crate) fn phantom_scene(
+    phantom: &Phantom,
+    limbs: &[PhantomPart],
+    materials: &Materials,
+) -> Scene {
     let mut builder = Builder {
         scene: Scene::default(),
         materials,

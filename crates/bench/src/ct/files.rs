@@ -217,7 +217,7 @@ pub(super) const REPORT_FILE: &str = "report.json";
 ///
 /// # Errors
 /// What cannot be written; interrupted.
-pub fn write_build(
+pub(crate) fn write_build(
     folder: &Path,
     build: &ScanBuild,
     wanted: BuildFiles,

@@ -15,14 +15,16 @@ mod truth;
 /// The room that a patient is put into unless somebody names another.
 pub const USUAL_ROOM: &str = include_str!("room.toml");
 
-pub use anatomy::{Materials, phantom_scene};
+pub use anatomy::Materials;
+pub(crate) use anatomy::phantom_scene;
 pub use build::{
     BuildOptions, BuiltTarget, GivenLabels, KnownMarkers, Registered, ScanBuild, SeenScan, build,
 };
 pub use built_folder::{
     BuildFacts, BuiltFolder, LesionFacts, MarkerFacts, SurfaceFacts, TargetFacts,
 };
-pub use files::{BuildFiles, BuildReport, SCENARIO_FILE, VOLUME_FILE, write_build};
+pub(crate) use files::write_build;
+pub use files::{BuildFiles, BuildReport, SCENARIO_FILE, VOLUME_FILE};
 pub use imaged::{Imaged, LastScan, imaged, scanned, write_patient};
 pub use patient::{PatientFrame, Room};
 pub use scan_order::{CtSubject, ScanOrder, ScanRange, SyntheticScan};

@@ -79,7 +79,7 @@ pub struct Room<'r> {
 
 /// The scenario of a patient that was built: surfaces as parts, the robot where the registration puts it, measured
 /// covariances, and these goals. It is for a file in `folder`, with the surfaces in [`SURFACES`] beside it.
-pub fn patient_scenario(
+pub(crate) fn patient_scenario(
     room: &Room<'_>,
     build: &ScanBuild,
     goals: Vec<GoalSection>,

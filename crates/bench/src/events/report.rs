@@ -18,7 +18,7 @@ use super::{EngineEvents, EventRun, section};
 use crate::setup::Setup;
 
 /// The report's part about the events of a configuration; `engines` are those that were to measure them.
-pub fn events_report(
+pub(crate) fn events_report(
     setup: &Setup<'_>,
     plan: &ConfigurationPlan,
     run: &EventRun,

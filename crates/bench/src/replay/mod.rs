@@ -33,7 +33,7 @@ pub use data::{ArmFiles, arm_files};
 pub use judge::SUBJECT;
 
 /// Version of the report's layout.
-pub const REPLAY_SCHEMA_VERSION: u32 = 1;
+pub(crate) const REPLAY_SCHEMA_VERSION: u32 = 1;
 
 /// The tip at which errors of joints are shown, beyond the flange along its z, m: where the needle of a
 /// guide is.

@@ -62,14 +62,14 @@ impl Served {
         self.reason.is_none()
     }
 
-    pub fn least_spare_m(&self) -> f64 {
+    pub(crate) fn least_spare_m(&self) -> f64 {
         let spare = self.spare_m.into_iter().flatten();
         spare.fold(f64::INFINITY, f64::min)
     }
 }
 
 impl Asked {
-    pub fn without_robot(rounded: Rounded) -> Self {
+    pub(crate) fn without_robot(rounded: Rounded) -> Self {
         Self {
             rounded,
             blocked: None,

@@ -113,7 +113,7 @@ impl PreparedSearch {
     }
 
     /// Whether the expected error of the tip is an objective.
-    pub fn expects_tip(&self) -> bool {
+    pub(crate) fn expects_tip(&self) -> bool {
         expects_tip(&self.section)
     }
 
@@ -129,7 +129,7 @@ impl PreparedSearch {
     }
 
     /// The candidate of a description in the log; none where it is of no factor's values.
-    pub fn candidate_of(&self, choice: &[(String, serde_json::Value)]) -> Option<Candidate> {
+    pub(crate) fn candidate_of(&self, choice: &[(String, serde_json::Value)]) -> Option<Candidate> {
         self.choices()
             .zip(choice)
             .map(|(factor, (_, value))| match &factor.kind {

@@ -95,7 +95,7 @@ impl Linear {
 
     /// Course of a joint after a step of its set-point by 1, one value per time step from 0; the
     /// torque of the servo beside it, N m/rad.
-    pub fn step_response(&self, joint: usize, steps: usize) -> Vec<f64> {
+    pub(crate) fn step_response(&self, joint: usize, steps: usize) -> Vec<f64> {
         let inverse = self.mass.try_inverse().unwrap_or_else(Matrix6::zeros);
         let (mut x, mut v) = (Joints::zeros(), Joints::zeros());
         let mut reference = Joints::zeros();
