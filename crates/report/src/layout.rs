@@ -66,7 +66,7 @@ pub fn wrapped(text: &str) -> String {
 }
 
 /// The same for a given width.
-pub fn wrapped_to(text: &str, width: usize) -> String {
+pub(crate) fn wrapped_to(text: &str, width: usize) -> String {
     let lines = text.split('\n').map(|line| {
         if visible(line) <= width || is_assignment(line) {
             line.to_owned()
@@ -112,7 +112,7 @@ fn broken(line: &str, width: usize) -> String {
 
 /// A heading in lines of at most `width` characters as far as its words allow: broken at spaces, and behind
 /// underscores and hyphens.
-pub fn in_lines(text: &str, width: usize) -> String {
+pub(crate) fn in_lines(text: &str, width: usize) -> String {
     let mut lines = vec![String::new()];
     for word in text.split_inclusive([' ', '_', '-']) {
         let last = lines.last_mut().expect("starts with one line");

@@ -18,9 +18,7 @@ mod replay;
 pub mod table;
 
 pub use files::write_atomically;
-pub use junit::{
-    JudgedLimit, comparison_junit, junit, limits_junit, study_comparison_junit, study_junit,
-};
+pub use junit::{JudgedLimit, comparison_junit, junit, limits_junit, study_comparison_junit};
 pub use markdown::{
     MetricDescription, comparison_markdown, markdown, metric_descriptions, metrics_markdown,
     schema_markdown, study_comparison_markdown,

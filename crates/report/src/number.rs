@@ -33,7 +33,7 @@ const fn unit(name: &'static str, length_m: f64, per_metre: f64) -> LengthUnit {
 
 /// The unit in which lengths up to `largest_m` are read best. Never metres: an arm's lengths are read
 /// in millimetres.
-pub fn unit_of_length(largest_m: f64) -> LengthUnit {
+pub(crate) fn unit_of_length(largest_m: f64) -> LengthUnit {
     let magnitude = largest_m.abs();
     LENGTHS[..4]
         .iter()
@@ -44,7 +44,7 @@ pub fn unit_of_length(largest_m: f64) -> LengthUnit {
 }
 
 /// A length that may span from picometres to millimetres, with its unit.
-pub fn small_length(metres: f64) -> String {
+pub(crate) fn small_length(metres: f64) -> String {
     let unit = unit_of_length(metres);
     if metres.abs() < unit.length_m {
         return format!("< 1 {}", unit.name);
@@ -53,7 +53,7 @@ pub fn small_length(metres: f64) -> String {
 }
 
 /// The same; 0 where it is none at all.
-pub fn small_length_or_zero(metres: f64) -> String {
+pub(crate) fn small_length_or_zero(metres: f64) -> String {
     if metres == 0.0 {
         "0".to_owned()
     } else {
@@ -62,7 +62,7 @@ pub fn small_length_or_zero(metres: f64) -> String {
 }
 
 /// A power of ten of metres, `1 nm` to `100 m`, without decimals.
-pub fn decade_of_length(power: i32) -> String {
+pub(crate) fn decade_of_length(power: i32) -> String {
     let unit = usize::try_from((power + 12).div_euclid(3)).map_or(0, |unit| unit.min(4));
     let unit = LENGTHS[unit];
     let count = 10_f64.powi(power) * unit.per_metre;
@@ -76,7 +76,7 @@ pub fn millimetres(metres: f64) -> String {
 
 /// A value and its limit, both in the same unit that people use; the value with as many digits as show on
 /// which side of its limit it is.
-pub fn value_and_limit(value: f64, limit: f64, unit: &str) -> (String, String) {
+pub(crate) fn value_and_limit(value: f64, limit: f64, unit: &str) -> (String, String) {
     let text = |value: f64| match unit {
         // Limits of accuracy are far below those of clearance.
         "m" if limit != 0.0 && limit.abs() < 1e-3 => small_length(value),
@@ -173,12 +173,12 @@ pub fn percent(share: f64) -> String {
 }
 
 /// A share in per cent with so many decimals.
-pub fn percent_with(share: f64, decimals: usize) -> String {
+pub(crate) fn percent_with(share: f64, decimals: usize) -> String {
     format!("{:.decimals$} %", 100.0 * share)
 }
 
 /// How many per cent a share is, with three digits or fewer.
-pub fn in_percent(share: f64) -> String {
+pub(crate) fn in_percent(share: f64) -> String {
     let value = 100.0 * share;
     if value != 0.0 && value.abs() < 1.0 {
         format!("{value:.2}")
@@ -188,7 +188,7 @@ pub fn in_percent(share: f64) -> String {
 }
 
 /// A length in mm, or another number, with two or three digits and no power of ten.
-pub fn three_digits(value: f64) -> String {
+pub(crate) fn three_digits(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {
         "0".to_owned()

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use needlebench_evaluation::accuracy::{AccuracyRow, AccuracyTable, QUANTITIES};
 
 /// A row for each group and one for all, `p` in the last; empty where nothing was measured.
-pub fn accuracy_csv(table: &AccuracyTable) -> String {
+pub(crate) fn accuracy_csv(table: &AccuracyTable) -> String {
     let mut header = vec!["group".to_owned(), "n".to_owned()];
     for quantity in QUANTITIES {
         let (key, unit) = (quantity.key, quantity.unit().symbol);

@@ -12,7 +12,7 @@ use super::{
 const PLUS_MINUS: &str = "\u{b1}";
 
 /// Three tables for `\input`: ours, and what has been published.
-pub fn accuracy_latex(table: &AccuracyTable) -> String {
+pub(crate) fn accuracy_latex(table: &AccuracyTable) -> String {
     let mut lines = vec![
         "% \\usepackage{booktabs}".to_owned(),
         "\\begin{table}".to_owned(),

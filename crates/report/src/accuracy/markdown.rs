@@ -12,7 +12,7 @@ use crate::markdown::escape::inline;
 const PLUS_MINUS: &str = "\u{b1}";
 
 /// Caption, table, notes, and what has been published.
-pub fn accuracy_markdown(table: &AccuracyTable) -> String {
+pub(crate) fn accuracy_markdown(table: &AccuracyTable) -> String {
     let mut lines = vec![
         format!("# Accuracy: {}", inline(&table.name)),
         String::new(),

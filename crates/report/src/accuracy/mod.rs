@@ -11,9 +11,9 @@ use needlebench_evaluation::accuracy::{
     AccuracyRow, AccuracyTable, QUANTITIES, Spread, TARGET_ED, Test, Tested,
 };
 
-pub use csv::accuracy_csv;
-pub use latex::accuracy_latex;
-pub use markdown::accuracy_markdown;
+pub(crate) use csv::accuracy_csv;
+pub(crate) use latex::accuracy_latex;
+pub(crate) use markdown::accuracy_markdown;
 pub use terminal::accuracy_text;
 
 /// Decimals of lengths and angles, as in the papers.

@@ -48,13 +48,13 @@ const RULES: [(Rule, Rgb); 8] = [
 ];
 
 /// Colour of what rejects a posture, by the rule's name, and under `works` of what does not.
-pub fn rule_colors() -> impl Iterator<Item = (&'static str, Rgb)> {
+pub(crate) fn rule_colors() -> impl Iterator<Item = (&'static str, Rgb)> {
     let rules = RULES.iter().map(|(rule, color)| (rule.name(), *color));
     std::iter::once(("works", WORKS)).chain(rules)
 }
 
 /// The chart of a goal's atlas.
-pub fn atlas_chart(scenario: &str, goal: &Goal, atlas: &GoalAtlas) -> Chart {
+pub(crate) fn atlas_chart(scenario: &str, goal: &Goal, atlas: &GoalAtlas) -> Chart {
     let foot = TOP_PX + atlas.families.len() as f64 * BAND_PX;
     let title = format!(
         "{scenario}, goal {}: least clearance by configuration and roll",

@@ -50,7 +50,7 @@ const ELLIPSE_95: f64 = 2.4477;
 
 /// Where the needle goes: 95 % ellipses at skin and target, across and along the needle, and the
 /// shares of the sources, for every configuration; none without imperfections.
-pub fn budget_chart(goal: &GoalReport) -> Option<Chart> {
+pub(crate) fn budget_chart(goal: &GoalReport) -> Option<Chart> {
     let budgets = budgets(goal);
     if budgets.is_empty() {
         return None;
@@ -64,7 +64,7 @@ pub fn budget_chart(goal: &GoalReport) -> Option<Chart> {
 
 /// The same of one configuration, on the scale of all of its goal, narrow enough for a column of a paper;
 /// none without imperfections.
-pub fn budget_figure(goal: &GoalReport, label: &str) -> Option<Chart> {
+pub(crate) fn budget_figure(goal: &GoalReport, label: &str) -> Option<Chart> {
     let budgets = budgets(goal);
     let of_all: Vec<(&str, &ErrorBudget)> = budgets
         .into_iter()

@@ -133,7 +133,7 @@ pub enum Mark {
     Text(Text),
 }
 
-/// A finished chart: [`Chart::to_svg`] and [`Chart::to_image`] draw it.
+/// A finished chart: `Chart::to_svg` and `Chart::to_image` draw it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
     /// Width and height, px.
@@ -160,7 +160,7 @@ impl Chart {
     }
 
     /// Adds a mark that says more to a pointer over it.
-    pub fn add_with_tip(&mut self, mark: Mark, tip: impl Into<String>) {
+    pub(crate) fn add_with_tip(&mut self, mark: Mark, tip: impl Into<String>) {
         self.marks.push((mark, Some(tip.into())));
     }
 
@@ -216,7 +216,7 @@ impl Chart {
     }
 
     /// Writes a title that begins at a point.
-    pub fn write_large(&mut self, at: [f64; 2], text: impl Into<String>) {
+    pub(crate) fn write_large(&mut self, at: [f64; 2], text: impl Into<String>) {
         self.add(Mark::Text(Text {
             at,
             anchor: Anchor::Start,
@@ -227,7 +227,7 @@ impl Chart {
     }
 
     /// Writes a line of text that runs upwards, with its middle at a point.
-    pub fn write_upwards(&mut self, at: [f64; 2], text: impl Into<String>) {
+    pub(crate) fn write_upwards(&mut self, at: [f64; 2], text: impl Into<String>) {
         self.add(Mark::Text(Text {
             at,
             anchor: Anchor::Middle,

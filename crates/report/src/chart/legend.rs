@@ -20,7 +20,7 @@ pub enum Sample {
 }
 
 /// Distance of rows, px.
-pub const ROW_PX: f64 = 22.0;
+pub(crate) const ROW_PX: f64 = 22.0;
 /// Length of a sample, and space after it and after the text, px.
 const SAMPLE_PX: f64 = 26.0;
 const GAPS_PX: [f64; 2] = [7.0, 22.0];
@@ -47,7 +47,7 @@ pub fn legend<'a>(
 }
 
 /// The same in a column, without a limit of width.
-pub fn legend_column<'a>(
+pub(crate) fn legend_column<'a>(
     chart: &mut Chart,
     [left, middle]: [f64; 2],
     entries: impl IntoIterator<Item = (Sample, &'a str)>,

@@ -1,8 +1,8 @@
 //! Charts in the plane.
 //!
 //! A [`Chart`] is a value: marks in pixels, in the order in which they lie on each other, made by the
-//! functions of this module from axes, panels and legends. Two back ends draw it: [`Chart::to_svg`]
-//! for a file and [`Chart::to_inline_svg`] for a page, and [`Chart::to_image`] for a PNG file. Both
+//! functions of this module from axes, panels and legends. Two back ends draw it: `Chart::to_svg`
+//! for a file and [`Chart::to_inline_svg`] for a page, and `Chart::to_image` for a PNG file. Both
 //! place everything the same, texts included: the raster back end writes with the glyphs that the
 //! 3D pictures use, the vector back end names fonts of the same advance. The same results give the
 //! same bytes on every machine: no system font, window or clock is asked.

@@ -54,7 +54,7 @@ pub enum Paint {
 
 impl Paint {
     /// The colour in a file.
-    pub fn rgb(self) -> Rgb {
+    pub(crate) fn rgb(self) -> Rgb {
         match self {
             Self::Ink => [25, 30, 38],
             Self::Soft => [110, 117, 126],

@@ -37,7 +37,7 @@ struct Phase {
 }
 
 /// Force and clearance over time, all engines in one chart.
-pub fn press_chart(title: &str, press: &PressPlan, run: &EventRun, index: usize) -> Chart {
+pub(crate) fn press_chart(title: &str, press: &PressPlan, run: &EventRun, index: usize) -> Chart {
     let curves: Vec<Curves> = run
         .engines
         .iter()

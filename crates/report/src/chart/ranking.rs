@@ -7,7 +7,7 @@ use super::weighted_bars::{WeightedBars, WeightedRow, weighted_bars};
 use crate::table::ranking::{counted, rows, value_and_contribution, words};
 
 /// The ranking as a chart; none if fewer than two configurations were ranked.
-pub fn ranking_chart(goal: &GoalReport) -> Option<Chart> {
+pub(crate) fn ranking_chart(goal: &GoalReport) -> Option<Chart> {
     let rows = rows(goal);
     let ranking = goal.ranking.as_ref().filter(|_| rows.len() > 1)?;
     let metrics = counted(ranking);

@@ -8,7 +8,7 @@ use super::paint::{Paint, Rgb, Stroke};
 
 impl Chart {
     /// The chart in pixels.
-    pub fn to_image(&self) -> Image {
+    pub(crate) fn to_image(&self) -> Image {
         let [width, height] = self.size.map(whole);
         let mut canvas = Canvas(Image::filled(width, height, Paint::Page.rgb()));
         for (mark, _) in &self.marks {

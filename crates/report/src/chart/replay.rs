@@ -27,7 +27,7 @@ const PANEL_PX: [f64; 2] = [400.0, 180.0];
 const STRIPS: usize = 400;
 
 /// Errors from the set-points, torques and currents of all joints.
-pub fn replay_chart(replay: &Replay) -> Chart {
+pub(crate) fn replay_chart(replay: &Replay) -> Chart {
     let title = format!(
         "{}: the real arm and its replay",
         replay.report.log.source.file

@@ -38,7 +38,7 @@ pub struct RouteColours {
     pub free: [Rgb; 2],
 }
 
-/// The colours of [`routes_chart`].
+/// The colours of `routes_chart`.
 pub fn route_colours() -> RouteColours {
     let rules = RULES.into_iter();
     RouteColours {
@@ -53,7 +53,7 @@ pub fn route_colours() -> RouteColours {
 const NUMBERED: usize = 8;
 
 /// The map of a plan; none if it has none.
-pub fn routes_chart(scenario: &str, plan: &RoutePlan) -> Option<Chart> {
+pub(crate) fn routes_chart(scenario: &str, plan: &RoutePlan) -> Option<Chart> {
     const SIZE: [f64; 2] = [1000.0, 600.0];
     let map = plan.map.as_ref()?;
     let title = format!("{scenario}, {}: routes to the target", plan.goal);

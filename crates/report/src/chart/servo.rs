@@ -42,7 +42,7 @@ const TOP_PX: f64 = 122.0;
 const ROW_PX: f64 = 318.0;
 
 /// The chart of one joint.
-pub fn servo_chart(report: &ServoReport, joint: &JointReport) -> Chart {
+pub(crate) fn servo_chart(report: &ServoReport, joint: &JointReport) -> Chart {
     let title = format!("{}: servo of {}", joint.joint, report.scenario);
     let size = [
         COLUMNS as f64 * COLUMN_PX + 16.0,

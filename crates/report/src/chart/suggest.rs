@@ -27,7 +27,7 @@ const ALLOWED: Rgb = [0, 158, 115];
 const HALF_DEG: f64 = 1.5;
 
 /// The skin as the target sees it: which directions are allowed, and what refuses the others.
-pub fn entries_chart(scenario: &str, found: &EntrySearch) -> Chart {
+pub(crate) fn entries_chart(scenario: &str, found: &EntrySearch) -> Chart {
     const SIZE: [f64; 2] = [1000.0, 580.0];
     let title = format!("{scenario}, {}: where a needle may enter", found.goal);
     let mut chart = Chart::new(SIZE, &*title);
@@ -74,7 +74,7 @@ fn colour(refused: Option<EntryRule>) -> Rgb {
 }
 
 /// The room from above: at how many configurations the worst goal is, at the best height of each place.
-pub fn places_chart(resolved: &ResolvedScenario, found: &PlaceSearch) -> Chart {
+pub(crate) fn places_chart(resolved: &ResolvedScenario, found: &PlaceSearch) -> Chart {
     const SIZE: [f64; 2] = [1000.0, 760.0];
     /// Edge of a place's square, px.
     const EDGE_PX: f64 = 18.0;

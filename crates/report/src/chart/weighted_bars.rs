@@ -45,7 +45,7 @@ const HEADS_PX: [f64; 3] = [24.0, 50.0, 78.0];
 const LINE_PX: f64 = 20.0;
 
 /// Draws the bars, with a numbered list of the columns below them.
-pub fn weighted_bars(bars: &WeightedBars) -> Chart {
+pub(crate) fn weighted_bars(bars: &WeightedBars) -> Chart {
     let columns = placed(&bars.columns);
     let width = |text: &str| Size::Small.width(text);
     let widest = |texts: &mut dyn Iterator<Item = &str>| texts.map(width).fold(0.0, f64::max);

@@ -5,6 +5,6 @@ mod recording;
 mod rtde;
 pub mod servo;
 
-pub use press::press_csv;
-pub use recording::{recording_csv, recording_name};
-pub use rtde::rtde_csv;
+pub(crate) use press::press_csv;
+pub(crate) use recording::{recording_csv, recording_name};
+pub(crate) use rtde::rtde_csv;

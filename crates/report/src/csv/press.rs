@@ -23,7 +23,7 @@ pub(crate) const STRIDE: usize = 5;
 /// One row every fifth step: time, phase, contact, clearance of what is to touch, joints and torques.
 ///
 /// Clearance is our own, of the recorded posture; force and depth are the engine's.
-pub fn press_csv(goal: &Goal, press: &PressPlan, recording: &Recording) -> String {
+pub(crate) fn press_csv(goal: &Goal, press: &PressPlan, recording: &Recording) -> String {
     let mut out = String::from("time_s,phase,rigid_contact_force_n,penetration_m,clearance_m");
     out.push_str(",tip_x_m,tip_y_m,tip_z_m");
     for quantity in ["position_rad", "torque_nm"] {

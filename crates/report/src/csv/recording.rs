@@ -10,7 +10,7 @@ use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_bench::EngineRun;
 
 /// Name of the file that a recording is written to: `Right-Down-Fold.rapier.csv`.
-pub fn recording_name(configuration: Configuration, engine: &str) -> String {
+pub(crate) fn recording_name(configuration: Configuration, engine: &str) -> String {
     format!("{configuration}.{engine}.csv")
 }
 
@@ -18,7 +18,11 @@ pub fn recording_name(configuration: Configuration, engine: &str) -> String {
 ///
 /// Units are in the column names; the pose is the engine's own, in the world, quaternion w first.
 /// The torque is the one that acted until that moment.
-pub fn recording_csv(run: &EngineRun, trajectory: &JointTrajectory, period_s: f64) -> String {
+pub(crate) fn recording_csv(
+    run: &EngineRun,
+    trajectory: &JointTrajectory,
+    period_s: f64,
+) -> String {
     let recording = &run.recording;
     let mut out = String::from("time_s,phase");
     for quantity in [

@@ -16,7 +16,7 @@ const JOINT_MODE: u32 = 253;
 /// where the arm's data have no torque constants.
 ///
 /// Robot, safety and joint modes are those of an arm that runs, and the speed is not scaled.
-pub fn rtde_csv(log: &RtdeLog) -> String {
+pub(crate) fn rtde_csv(log: &RtdeLog) -> String {
     let has_currents = log
         .rows
         .first()

@@ -7,7 +7,7 @@ use needlebench_bench::servo::{JointReport, ServoReport};
 use needlebench_kinematics::JOINT_LABELS;
 
 /// A course in all engines: time, set-point, then motion, torque and saturation per engine.
-pub fn course_csv(
+pub(crate) fn course_csv(
     joint: &JointReport,
     timestep_s: f64,
     which: impl Fn(&JointResponse) -> &Course,
@@ -41,7 +41,7 @@ pub fn course_csv(
 }
 
 /// Gain and phase over frequency of all joints and engines.
-pub fn frequency_csv(report: &ServoReport) -> String {
+pub(crate) fn frequency_csv(report: &ServoReport) -> String {
     let mut csv =
         String::from("joint,engine,frequency_hz,gain,phase_rad,linear_gain,linear_phase_rad\n");
     for joint in &report.joints {

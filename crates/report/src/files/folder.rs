@@ -61,7 +61,7 @@ impl Folder<'_> {
     }
 
     /// Writes a chart in pixels and in vectors; gives the names of both files.
-    pub fn write_chart(self, stem: &str, chart: &Chart) -> Result<[String; 2], FilesError> {
+    pub(crate) fn write_chart(self, stem: &str, chart: &Chart) -> Result<[String; 2], FilesError> {
         let [png, svg] = CHARTS.map(|extension| format!("{stem}.{extension}"));
         self.write_image(&png, &chart.to_image())?;
         self.write(&svg, chart.to_svg())?;
@@ -81,7 +81,7 @@ impl Folder<'_> {
     }
 
     /// Removes the files of a chart that an earlier run drew.
-    pub fn remove_chart(self, stem: &str) -> Result<(), FilesError> {
+    pub(crate) fn remove_chart(self, stem: &str) -> Result<(), FilesError> {
         CHARTS
             .iter()
             .try_for_each(|extension| self.remove(&format!("{stem}.{extension}")))
@@ -89,7 +89,7 @@ impl Folder<'_> {
 
     /// Removes recordings and pictures that an earlier run left in a folder within this one; `written`
     /// are those of this run.
-    pub fn remove_others(self, folder: &str, written: &[String]) -> Result<(), FilesError> {
+    pub(crate) fn remove_others(self, folder: &str, written: &[String]) -> Result<(), FilesError> {
         let path = self.path(folder);
         let entries = std::fs::read_dir(&path).and_then(Iterator::collect::<io::Result<Vec<_>>>);
         let entries = entries.map_err(|source| FilesError::Remove { path, source })?;

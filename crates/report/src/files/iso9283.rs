@@ -11,7 +11,7 @@ use crate::chart::iso9283::{attained_chart, stabilisation_chart};
 
 /// Writes commanded poses, each engine's log in the shape of a laser tracker's, and charts; gives
 /// the names of the files.
-pub fn write_test(
+pub(crate) fn write_test(
     scenario: &str,
     report: &Iso9283Report,
     run: &ProtocolRun,

@@ -14,7 +14,7 @@ use crate::table::search::search_text;
 /// Version of the keys of `search.json`.
 const SCHEMA_VERSION: u32 = 1;
 /// Name of the log in a study's folder.
-pub const SEARCH_FILE: &str = "search.json";
+pub(crate) const SEARCH_FILE: &str = "search.json";
 /// Name of the page in a study's folder.
 const PAGE_FILE: &str = "search.html";
 

@@ -11,7 +11,7 @@ mod times;
 
 pub use comparison::comparison_junit;
 pub use limits::{JudgedLimit, limits_junit};
-pub use replay::replay_junit;
+pub(crate) use replay::replay_junit;
 pub use run::junit;
-pub use study::study_junit;
+pub(crate) use study::study_junit;
 pub use study_comparison::study_comparison_junit;

@@ -12,7 +12,10 @@ use crate::number::value_and_limit;
 
 /// A replay as a JUnit document. Of two replays its times alone differ: `elapsed`,
 /// shared evenly among its cases.
-pub fn replay_junit(report: &ReplayReport, elapsed: Duration) -> Result<String, SerializeError> {
+pub(crate) fn replay_junit(
+    report: &ReplayReport,
+    elapsed: Duration,
+) -> Result<String, SerializeError> {
     let mut document = quick_junit::Report::new("needlebench");
     let name = format!("{SUBJECT}.{}", report.log.source.file);
     let mut suite = TestSuite::new(name.clone());

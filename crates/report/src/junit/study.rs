@@ -11,7 +11,7 @@ use super::times::share_time;
 
 /// The criteria of a study as one JUnit document; `headline` says what the study is no answer to, and
 /// `elapsed` is shared evenly among the cases.
-pub fn study_junit(
+pub(crate) fn study_junit(
     name: &str,
     headline: Option<&str>,
     criteria: &[CriterionResult],

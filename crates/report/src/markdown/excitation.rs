@@ -5,7 +5,7 @@ use std::fmt::Write;
 use needlebench_evaluation::excitation::{ExcitationReport, proven_m};
 
 /// What a run found, a row for each engine and payload.
-pub fn report_markdown(report: &ExcitationReport) -> String {
+pub(crate) fn report_markdown(report: &ExcitationReport) -> String {
     let millimetres =
         |value: Option<f64>| value.map_or("-".to_owned(), |metres| format!("{:.1}", metres * 1e3));
     let [others, itself] = proven_m(&report.planned).map(millimetres);

@@ -7,7 +7,7 @@ use needlebench_evaluation::iso9283::Iso9283Report;
 use crate::number::{small_length, small_length_or_zero};
 
 /// What a run found, a row for each engine and pose.
-pub fn report_markdown(report: &Iso9283Report) -> String {
+pub(crate) fn report_markdown(report: &Iso9283Report) -> String {
     let protocol = &report.protocol;
     let mut text = format!(
         "ISO 9283 in {}: load {} kg, {:.0} % of the rated speed, {} cycles\n\n\

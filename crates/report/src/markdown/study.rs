@@ -31,7 +31,11 @@ fn headings(header: &[String]) -> Vec<String> {
 
 /// The summary as Markdown: what answers the study, then all else folded in; without a verdict where there is
 /// nothing to judge.
-pub fn summary_markdown(title: &str, verdict: Option<Verdict>, document: &Document) -> String {
+pub(crate) fn summary_markdown(
+    title: &str,
+    verdict: Option<Verdict>,
+    document: &Document,
+) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = write_markdown(&mut text, title, verdict, document);

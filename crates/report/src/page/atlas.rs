@@ -17,7 +17,7 @@ const SCRIPT: &str = include_str!("assets/atlas.js");
 const WORKS: u8 = u8::MAX;
 
 /// The page of a finished atlas: ranges, reasons, clearances and postures over the roll.
-pub fn atlas_page(
+pub(crate) fn atlas_page(
     resolved: &ResolvedScenario,
     atlases: &[(&Goal, GoalAtlas)],
     report: &AtlasReport,

@@ -30,7 +30,7 @@ pub mod study;
 mod viewer;
 mod words;
 
-pub use atlas::atlas_page;
-pub use replay::replay_page;
-pub use run::run_page;
-pub use search::search_page;
+pub(crate) use atlas::atlas_page;
+pub(crate) use replay::replay_page;
+pub(crate) use run::run_page;
+pub(crate) use search::search_page;

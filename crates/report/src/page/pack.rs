@@ -36,7 +36,7 @@ impl Pack {
     }
 
     /// Bytes.
-    pub fn u8s(&mut self, values: &[u8]) -> Value {
+    pub(crate) fn u8s(&mut self, values: &[u8]) -> Value {
         let reference = self.place("u8", values.len());
         self.bytes.extend_from_slice(values);
         reference
@@ -102,7 +102,7 @@ impl Pack {
     }
 
     /// Codes.
-    pub fn u16s(&mut self, values: &[u16]) -> Value {
+    pub(crate) fn u16s(&mut self, values: &[u16]) -> Value {
         let reference = self.place("u16", values.len());
         let bytes = values.iter().flat_map(|value| value.to_le_bytes());
         self.bytes.extend(bytes);
@@ -111,7 +111,7 @@ impl Pack {
 
     /// Single precision.
     #[expect(clippy::cast_possible_truncation, reason = "places for a screen")]
-    pub fn f32s(&mut self, values: impl IntoIterator<Item = f64>) -> Value {
+    pub(crate) fn f32s(&mut self, values: impl IntoIterator<Item = f64>) -> Value {
         let values: Vec<f32> = values.into_iter().map(|value| value as f32).collect();
         let reference = self.place("f32", values.len());
         let bytes = values.iter().flat_map(|value| value.to_le_bytes());
@@ -122,7 +122,7 @@ impl Pack {
     /// A column of numbers in no order, in at most 65534 `steps` of its range: values are off by half a
     /// step at most, and what is not finite is none. All low bytes come first, then all high ones
     /// (`"p": 1`), which deflates better; fewer than 255 steps take one byte, and 255 is none.
-    pub fn coarse_column(&mut self, values: &[f32], steps: u16) -> Value {
+    pub(crate) fn coarse_column(&mut self, values: &[f32], steps: u16) -> Value {
         let wide: Vec<f64> = values.iter().map(|&value| f64::from(value)).collect();
         let (low, step, codes) = quantised(&wide, steps);
         let narrow = steps < 255;
@@ -233,7 +233,7 @@ pub(super) mod unpack {
     }
 
     /// From the text of a page.
-    pub fn of_page(html: &str) -> Unpacked {
+    pub(crate) fn of_page(html: &str) -> Unpacked {
         const START: &str = "<script type=\"application/octet-stream\" id=\"payload\">";
         let (_, rest) = html.split_once(START).unwrap();
         of_payload(rest.split_once("</script>").unwrap().0)

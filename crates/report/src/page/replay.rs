@@ -25,7 +25,7 @@ const HINTS: &str = "for (const box of document.querySelectorAll('.scroll')) NB.
                      document.documentElement.dataset.ready = 'true';\n";
 
 /// The page of a recorded run.
-pub fn replay_page(report: &ReplayReport, chart: Option<&Chart>) -> String {
+pub(crate) fn replay_page(report: &ReplayReport, chart: Option<&Chart>) -> String {
     let mut out = String::new();
     // Writing to a text cannot fail.
     let _ = body(&mut out, report, chart);

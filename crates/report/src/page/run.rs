@@ -31,7 +31,7 @@ const SCRIPT: &str = concat!(
 
 /// The page of a finished run: everything of its report but the timings, the cell, and all recorded
 /// motions.
-pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
+pub(crate) fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
     let mut pack = Pack::default();
     let report = &finished.report;
     let mut document = json!({

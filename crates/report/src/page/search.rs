@@ -29,7 +29,7 @@ const MOST_PICTURES: usize = 3;
 ///
 /// # Errors
 /// Of the pictures.
-pub fn search_page(
+pub(crate) fn search_page(
     search: &PreparedSearch,
     log: &SearchLog,
     document: &Value,

@@ -81,7 +81,7 @@ const NEEDLE_RGBA: [f32; 4] = [0.0, 0.55, 0.2, 1.0];
 const REFUSED_RGBA: [f32; 4] = [0.85, 0.1, 0.05, 1.0];
 
 /// Draws one configuration in its final posture; `None` if it has none.
-pub fn configuration_picture(
+pub(crate) fn configuration_picture(
     resolved: &ResolvedScenario,
     backdrop: &Backdrop,
     camera: &Camera,
@@ -131,7 +131,7 @@ pub fn configuration_picture(
 }
 
 /// Draws the cell of a scenario with the arm in a posture at its first goal.
-pub fn placement_picture(resolved: &ResolvedScenario, q: &Joints) -> Image {
+pub(crate) fn placement_picture(resolved: &ResolvedScenario, q: &Joints) -> Image {
     let goal = &resolved.goals[0];
     let mut scene = posture_scene(resolved, &Backdrop::new(resolved), q);
     scene.lines.push(Line3 {
@@ -177,7 +177,7 @@ pub(super) fn floor(resolved: &ResolvedScenario, goal: &Goal) -> Floor {
 }
 
 /// The camera of all pictures of a goal, so that they can be compared.
-pub fn goal_camera(resolved: &ResolvedScenario, goal: &Goal) -> Camera {
+pub(crate) fn goal_camera(resolved: &ResolvedScenario, goal: &Goal) -> Camera {
     Camera::framing(&framed(resolved, goal), viewpoint(resolved, goal), SIZE_PX)
 }
 
@@ -237,7 +237,7 @@ fn caption(report: &ConfigurationReport) -> String {
 }
 
 /// Caption of a configuration on the sheet of its goal.
-pub fn sheet_caption(goal: &GoalReport, report: &ConfigurationReport) -> String {
+pub(crate) fn sheet_caption(goal: &GoalReport, report: &ConfigurationReport) -> String {
     let chosen = goal
         .recommended
         .as_ref()

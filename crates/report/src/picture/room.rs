@@ -285,7 +285,7 @@ fn numbers(room: &RoomReport) -> String {
 }
 
 /// Caption of a configuration on the sheet.
-pub fn room_caption(goal: &GoalReport, report: &ConfigurationReport) -> String {
+pub(crate) fn room_caption(goal: &GoalReport, report: &ConfigurationReport) -> String {
     let Some(room) = &report.room else {
         return sheet_caption(goal, report);
     };

@@ -31,7 +31,7 @@ pub(crate) fn mm(metres: f64) -> String {
 }
 
 /// Budgets as a table with what follows from them; none without imperfections.
-pub fn budget_text(goal: &GoalReport) -> Option<String> {
+pub(crate) fn budget_text(goal: &GoalReport) -> Option<String> {
     let budgets = budgets(goal);
     let (_, first) = budgets.first()?;
     let mut header = vec!["configuration".to_owned()];

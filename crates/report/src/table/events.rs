@@ -10,7 +10,7 @@ use super::{Table, plain_table};
 use crate::number::{millimetres, percent_with, small_length};
 
 /// What the events of a goal's configurations measured; none where none were asked for.
-pub fn events_text(goal: &GoalReport) -> Option<String> {
+pub(crate) fn events_text(goal: &GoalReport) -> Option<String> {
     goal.configurations
         .iter()
         .find(|each| each.events.is_some())?;
@@ -33,7 +33,7 @@ pub fn events_text(goal: &GoalReport) -> Option<String> {
 }
 
 /// The same in a sentence: the worst of each kind over configurations and engines.
-pub fn events_in_words(goal: &GoalReport) -> Option<String> {
+pub(crate) fn events_in_words(goal: &GoalReport) -> Option<String> {
     let events = || {
         goal.configurations
             .iter()

@@ -103,7 +103,7 @@ fn two_digits(value: f64) -> String {
 }
 
 /// Proven clearances: by class, and motion by motion.
-pub fn clearances_text(report: &PlanReport) -> String {
+pub(crate) fn clearances_text(report: &PlanReport) -> String {
     let mut text = format!(
         "Proven least clearances of {}: arm, tool and payload along every motion of the run, for the nominal \
          arm.\nAsked for: {:.1} mm from everything else, {:.1} mm from itself.\n\n",

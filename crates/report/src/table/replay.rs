@@ -113,7 +113,7 @@ fn head(out: &mut String, report: &ReplayReport) {
 }
 
 /// What nominal lengths and the calibration leave of the log's poses, in words.
-pub fn pose_errors(fit: &CalibrationFit) -> [(&'static str, &PoseError); 5] {
+pub(crate) fn pose_errors(fit: &CalibrationFit) -> [(&'static str, &PoseError); 5] {
     [
         ("nominal lengths, all rows", &fit.nominal),
         ("calibrated, all rows", &fit.fitted),

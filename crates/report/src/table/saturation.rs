@@ -5,7 +5,7 @@ use std::fmt::Write;
 use needlebench_evaluation::report::GoalReport;
 
 /// One line per configuration, engine and joint; empty if no torque was ever cut.
-pub fn saturation_text(goal: &GoalReport) -> String {
+pub(crate) fn saturation_text(goal: &GoalReport) -> String {
     let mut out = String::new();
     for configuration in &goal.configurations {
         for (engine, report) in &configuration.engines {

@@ -14,7 +14,7 @@ use crate::number::percent;
 const MOST_ROWS: usize = 8;
 
 /// The answer, or how far it is.
-pub fn search_text(search: &PreparedSearch, log: &SearchLog) -> String {
+pub(crate) fn search_text(search: &PreparedSearch, log: &SearchLog) -> String {
     let name = &search.study.file.name;
     let Some(answer) = &log.answer else {
         return format!("{name}: no answer yet after {} cases\n", log.cases);

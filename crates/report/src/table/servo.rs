@@ -156,7 +156,7 @@ fn rows(joint: &JointReport, response: &JointResponse) -> Vec<Vec<String>> {
 }
 
 /// Largest difference of gain (dB) and phase (deg) from the linear closed loop.
-pub fn worst_deviation(response: &JointResponse) -> (f64, f64) {
+pub(crate) fn worst_deviation(response: &JointResponse) -> (f64, f64) {
     let mut worst = (0.0_f64, 0.0_f64);
     for point in &response.frequencies {
         let gain_db = 20.0 * libm::log10(point.gain / point.linear_gain);

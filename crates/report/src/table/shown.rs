@@ -63,7 +63,7 @@ impl Shown {
     }
 
     /// Whether there is anything to say of a goal: of true targets there is not where none is known.
-    pub fn says_something(&self, goal: &GoalReport) -> bool {
+    pub(crate) fn says_something(&self, goal: &GoalReport) -> bool {
         let mut all = goal.configurations.iter();
         !self.metric().is_of_true_target || all.any(|each| self.value(each).is_some())
     }

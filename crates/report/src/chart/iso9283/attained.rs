@@ -45,7 +45,7 @@ const ROWS: [(usize, &str); 2] = [(1, "y"), (2, "z")];
 /// Attained positions of every pose about its command, in two projections, all on one scale: a
 /// line to the mean as long as AP, the circle of that radius about the command, and the one of
 /// radius RP about the mean.
-pub fn attained_chart(
+pub(crate) fn attained_chart(
     heading: &str,
     statistics: &ProtocolStatistics,
     attained: &[Attained],

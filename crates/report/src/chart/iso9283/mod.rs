@@ -3,5 +3,5 @@
 mod attained;
 mod stabilisation;
 
-pub use attained::attained_chart;
-pub use stabilisation::stabilisation_chart;
+pub(crate) use attained::attained_chart;
+pub(crate) use stabilisation::stabilisation_chart;

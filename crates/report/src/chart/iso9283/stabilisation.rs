@@ -26,7 +26,7 @@ const BAND: Stroke = Stroke {
 
 /// Distance from the attained position over the time from the end of the planned motion, of the
 /// first arrivals at each pose.
-pub fn stabilisation_chart(heading: &str, arrivals: &[Arrival], limit_band_m: f64) -> Chart {
+pub(crate) fn stabilisation_chart(heading: &str, arrivals: &[Arrival], limit_band_m: f64) -> Chart {
     let [left, top] = CORNER_PX;
     let [width, height] = PANEL_PX;
     let title = format!("{heading}: coming to rest");

@@ -12,7 +12,7 @@ pub(super) fn between(interval: Interval, text: impl Fn(f64) -> String) -> Strin
 }
 
 /// `93.2 (92.1 .. 94.0)`.
-pub fn rate_text(rate: &Rate) -> String {
+pub(crate) fn rate_text(rate: &Rate) -> String {
     match (rate.rate, rate.interval) {
         (Some(share), Some(interval)) => {
             format!("{} ({})", in_percent(share), between(interval, in_percent))

@@ -27,7 +27,7 @@ fn radius(found: &SmallestFound) -> String {
 }
 
 /// How the radii were searched for, in words.
-pub fn robustness_method(results: &[RobustnessResult]) -> Option<Method> {
+pub(crate) fn robustness_method(results: &[RobustnessResult]) -> Option<Method> {
     let first = &results.first()?.found;
     // Where it is broken as it stands nothing is searched.
     let most = |pick: fn(&SmallestFound) -> u32| {
@@ -51,7 +51,7 @@ pub fn robustness_method(results: &[RobustnessResult]) -> Option<Method> {
 }
 
 /// The radii as a table, with the rule that breaks.
-pub fn robustness_blocks(results: &[RobustnessResult]) -> Vec<Block> {
+pub(crate) fn robustness_blocks(results: &[RobustnessResult]) -> Vec<Block> {
     let rows = results
         .iter()
         .map(|result| {
