@@ -40,7 +40,7 @@ pub fn in_parts<T: Send, S>(
     if is_shared_out(threads) {
         let numbered = numbered.par_bridge();
         on_threads(threads, || {
-            numbered.for_each_init(|| make(), |own, (at, part)| work(own, at, part));
+            numbered.for_each_init(&make, |own, (at, part)| work(own, at, part));
         });
     } else {
         let mut own = make();

@@ -82,18 +82,3 @@ pub struct Floor {
     /// Distance of the grid's lines, which go through the world's origin, m.
     pub spacing_m: f64,
 }
-
-impl Scene {
-    /// Every finite vertex and line end, in the world, m: what [`Camera::framing`](crate::Camera::framing) is to show.
-    pub(crate) fn points_m(&self) -> Vec<Point3<f64>> {
-        let vertices = self.surfaces.iter().flat_map(|surface| {
-            let place = |vertex_m: &Point3<f64>| surface.world_from_surface * vertex_m;
-            surface.mesh.vertices_m.iter().map(place)
-        });
-        let ends = self.lines.iter().flat_map(|line| [line.from_m, line.to_m]);
-        vertices
-            .chain(ends)
-            .filter(|point_m| point_m.coords.iter().all(|x| x.is_finite()))
-            .collect()
-    }
-}

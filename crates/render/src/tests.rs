@@ -71,6 +71,16 @@ fn look(surfaces: Vec<SurfaceInstance>) -> [u8; 3] {
     center(&render(&scene(surfaces), &front()))
 }
 
+/// Every vertex and line end, in the world, m.
+fn points_m(scene: &Scene) -> Vec<Point3<f64>> {
+    let vertices = scene.surfaces.iter().flat_map(|surface| {
+        let place = |vertex_m: &Point3<f64>| surface.world_from_surface * vertex_m;
+        surface.mesh.vertices_m.iter().map(place)
+    });
+    let ends = scene.lines.iter().flat_map(|line| [line.from_m, line.to_m]);
+    vertices.chain(ends).collect()
+}
+
 /// A robot-like arm above a translucent body with a lesion, on a table.
 fn bench() -> Scene {
     let (blue, grey) = ([0.36, 0.60, 0.80, 1.0], [0.74, 0.76, 0.79, 1.0]);
@@ -218,7 +228,7 @@ fn bench() -> Scene {
 }
 
 fn bench_camera(size_px: [u32; 2]) -> Camera {
-    Camera::framing(&bench().points_m(), Vector3::new(-0.7, 1.0, -0.6), size_px)
+    Camera::framing(&points_m(&bench()), Vector3::new(-0.7, 1.0, -0.6), size_px)
 }
 
 #[test]

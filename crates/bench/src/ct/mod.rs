@@ -23,7 +23,6 @@ pub use build::{
 pub use built_folder::{
     BuildFacts, BuiltFolder, LesionFacts, MarkerFacts, SurfaceFacts, TargetFacts,
 };
-pub(crate) use files::write_build;
 pub use files::{BuildFiles, BuildReport, SCENARIO_FILE, VOLUME_FILE};
 pub use imaged::{Imaged, LastScan, imaged, scanned, write_patient};
 pub use patient::{PatientFrame, Room};

@@ -52,6 +52,7 @@ pub use events::{EventsSection, PressClass, PressSection, StopSection};
 pub use excitation::{ExcitationSection, PayloadSection, SweepSection};
 pub use fixtures::{GantrySection, MountKind, MountSection, TableSection};
 pub(crate) use goals::EVERY_CONFIGURATION;
+#[cfg(test)]
 pub(crate) use goals::REJECTION_RULES;
 pub use goals::{FlangePose, GoalSection, Target};
 pub use imperfections::{

@@ -341,8 +341,8 @@ fn key(python: &Python) -> String {
     ];
     let parts = parts.into_iter().chain(SOURCES);
     let texts = parts.flat_map(|(name, text)| [name, text]);
-    let told_apart: String = texts.map(|text| format!("{}:{text}", text.len())).collect();
-    sha256_hex(told_apart.as_bytes())
+    let told_apart: Vec<String> = texts.map(|text| format!("{}:{text}", text.len())).collect();
+    sha256_hex(told_apart.concat().as_bytes())
 }
 
 /// An environment variable that is set to something.

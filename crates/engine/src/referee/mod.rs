@@ -106,21 +106,6 @@ impl RefereePlant {
         settings: &RefereeSettings,
     ) -> Result<Self, EngineError> {
         check_bodies(cell)?;
-        Self::from_dynamics(
-            cell.dynamics(),
-            cell.robot.world_from_base_link,
-            timestep_s,
-            settings,
-        )
-    }
-
-    /// An arm by its equations of motion alone.
-    pub(crate) fn from_dynamics(
-        dynamics: Dynamics,
-        world_from_base_link: Pose,
-        timestep_s: f64,
-        settings: &RefereeSettings,
-    ) -> Result<Self, EngineError> {
         let timestep_s = checked_timestep_s(timestep_s)?;
         if !TOLERANCES.contains(&settings.tolerance) {
             return Err(EngineError::BadSetting {
@@ -130,8 +115,8 @@ impl RefereePlant {
             });
         }
         let mut plant = Self {
-            dynamics,
-            world_from_base_link,
+            dynamics: cell.dynamics(),
+            world_from_base_link: cell.robot.world_from_base_link,
             settings: *settings,
             timestep_s,
             settled: Phase::zeros(),

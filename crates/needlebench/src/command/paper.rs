@@ -45,7 +45,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus, Failure> {
     progress.finish();
     let mut found = found.map_err(|error| match error {
         PaperError::Interrupted => Failure::interrupted("interrupted: nothing was written"),
-        error => Failure::Environment(error.into()),
+        error @ PaperError::Model(_) => Failure::Environment(error.into()),
     })?;
     found
         .write(Folder(&arguments.out))

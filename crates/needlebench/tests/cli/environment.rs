@@ -186,9 +186,7 @@ fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
     let path = format!("{}:{path}", bench.path("bin").display());
     let with_uv = [&offline[..], &[("PATH", Some(path.as_str()))]].concat();
     let prepare = "doctor --prepare --wheels wheels --json";
-    let refused = bench
-        .run_with(&with_uv, "doctor --prepare")
-        .exits_with(3);
+    let refused = bench.run_with(&with_uv, "doctor --prepare").exits_with(3);
     refused.complains([
         "uv failed, trying pip instead",
         "needlebench doctor --download",

@@ -27,7 +27,6 @@ pub use error::FilesError;
 pub use excitation::write_plan;
 pub use folder::Folder;
 pub use iso9283::write_measured;
-pub(crate) use iso9283::write_test;
 pub use replay::{CALIBRATION_FILE, write_replay};
 pub use routes::write_route_maps;
 pub use run::{RunFiles, write_run};

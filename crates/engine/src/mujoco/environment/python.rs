@@ -85,19 +85,19 @@ pub(super) fn find(options: &EnvironmentOptions) -> Result<Python, EnvironmentEr
         let path = named.flatten().unwrap_or_else(|| chosen.clone());
         return probe(&path).map_err(|reason| EnvironmentError::ChosenPython { path, reason });
     }
-    let mut rejected = String::new();
+    let mut rejected: Vec<String> = Vec::new();
     for name in NAMES.split(' ') {
         for path in on_path(options, OsStr::new(name)) {
             match probe(&path) {
                 Ok(python) => return Ok(python),
-                Err(reason) => rejected += &format!("\n  {}: {reason}", path.display()),
+                Err(reason) => rejected.push(format!("\n  {}: {reason}", path.display())),
             }
         }
     }
     let tried = if rejected.is_empty() {
         "found none at all".to_owned()
     } else {
-        format!("tried:{rejected}")
+        format!("tried:{}", rejected.concat())
     };
     Err(EnvironmentError::NoPython { tried })
 }

@@ -270,7 +270,7 @@ impl Numerical {
             tolerance: 1e-9,
         };
         let end = descend(&self.kernel, target, start, &steering);
-        end.reached.then(|| Refined {
+        end.reached.then_some(Refined {
             joints: end.q,
             residual_m: end.residual_m,
             residual_rad: end.residual_rad,
