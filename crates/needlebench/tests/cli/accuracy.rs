@@ -65,7 +65,7 @@ fn a_run_leaves_the_table_in_three_formats_and_takes_it_away_again() {
         assert!(!bench.read(&format!("out/small/{name}")).is_empty());
     }
     // A run without the table leaves none of an earlier one.
-    bench.run(&run).exits_with(0);
+    bench.run(run).exits_with(0);
     for name in ["accuracy.md", "accuracy.csv", "accuracy.tex"] {
         assert!(!bench.path(&format!("out/small/{name}")).exists(), "{name}");
     }
@@ -76,7 +76,7 @@ fn a_study_of_postures_says_so_and_counts_each_case_once() {
     let bench = Bench::with_scenario(SMALL);
     bench.write("study.toml", STUDY);
     let study = "study study.toml --quiet --no-page --table accuracy --by roll";
-    let answer = bench.run(&study).exits_with(0);
+    let answer = bench.run(study).exits_with(0);
     let words: Vec<&str> = answer.stdout.split_whitespace().collect();
     assert!(
         words.join(" ").contains("final postures only"),

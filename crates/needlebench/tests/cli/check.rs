@@ -169,7 +169,7 @@ fn a_goal_out_of_reach_is_a_finding_with_what_is_missing() {
         .position(|line| line.starts_with("entry_mm"))
         .unwrap();
     let message = findings[0]["message"].word();
-    holds(&message, ["out of reach", "mm or more are missing"]);
+    holds(message, ["out of reach", "mm or more are missing"]);
     assert_eq!(findings[0]["key"], "goals[0].entry_mm");
     assert_eq!(findings[0]["line"], line);
     // A run says the same, configuration by configuration.
@@ -201,6 +201,6 @@ fn a_route_through_bone_is_a_finding() {
     let answer = bench.run("check s.toml --json").exits_with(2).json();
     let findings = answer["findings"].list();
     let message = findings[0]["message"].word();
-    holds(&message, ["needle", "rib_"]);
+    holds(message, ["needle", "rib_"]);
     assert_eq!(findings[0]["key"], "goals[0].entry_mm");
 }

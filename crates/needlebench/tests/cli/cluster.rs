@@ -46,7 +46,7 @@ fn task(bench: &Bench, variables: &[(&str, &str)]) -> Answer {
         all.push((name, set.map(|(_, value)| *value)));
     }
     let arguments = "study study.toml --shard auto --out shards --resume --yes --quiet --jobs 1";
-    bench.run_with(&all, &arguments)
+    bench.run_with(&all, arguments)
 }
 
 fn status(bench: &Bench, more: &str) -> Answer {
@@ -90,7 +90,7 @@ fn shards_of_any_scheduler_are_told_apart_counted_and_merged_from_their_folder()
     assert_eq!(status(&bench, "--missing").exits_with(1).stdout, "3,4\n");
     let merge = "merge study.toml shards --no-page --quiet";
     bench
-        .run(&merge)
+        .run(merge)
         .exits_with(2)
         .complains(["48 of 96 cases are missing", "shard 3/4"]);
     // Asked for again in an array of its own.
@@ -115,9 +115,9 @@ fn shards_of_any_scheduler_are_told_apart_counted_and_merged_from_their_folder()
     assert_eq!(answer["complete"], true);
     assert_eq!(answer["folders"].list().len(), 4);
     assert_eq!(status(&bench, "--missing").exits_with(0).stdout, "");
-    bench.run(&merge).exits_with(0);
+    bench.run(merge).exits_with(0);
     let whole = "study study.toml --out whole --no-page --quiet";
-    bench.run(&whole).exits_with(0);
+    bench.run(whole).exits_with(0);
     for file in ["results.parquet", "summary.json"] {
         assert!(
             bench.read(&format!("out/moved/{file}")) == bench.read(&format!("whole/moved/{file}")),
@@ -161,7 +161,7 @@ fn a_folder_in_use_may_pass_and_a_wrong_one_never_does() {
     task(&bench, &of).exits_with(0);
     let arguments = "study study.toml --shard 1/3 --out shards/2 --resume";
     bench
-        .run(&arguments)
+        .run(arguments)
         .exits_with(2)
         .complains(["is of shard 2/4"]);
 }

@@ -16,7 +16,7 @@ fn with_requirements() -> String {
 #[test]
 fn requirements_are_carried_to_every_report() {
     let bench = Bench::with_scenario(&with_requirements());
-    bench.run(&RUN).exits_with(0);
+    bench.run(RUN).exits_with(0);
     let report = bench.read_json("out/small/report.json");
     let trace = report["trace"].list();
     assert_eq!(trace.len(), 3);
@@ -45,7 +45,7 @@ fn requirements_are_carried_to_every_report() {
 #[test]
 fn credibility_is_collected_from_a_run_and_a_replay() {
     let bench = Bench::with_scenario(&with_requirements());
-    bench.run(&RUN).exits_with(0);
+    bench.run(RUN).exits_with(0);
     let template = bench.run("report --template").exits_with(0).stdout;
     let filled = template.replace(
         "question_of_interest = \"\"",
@@ -53,7 +53,7 @@ fn credibility_is_collected_from_a_run_and_a_replay() {
     );
     bench.write("judgement.toml", filled);
     let report = "report out/small --credibility --judgement judgement.toml";
-    let text = bench.run(&report).exits_with(0).stdout;
+    let text = bench.run(report).exits_with(0).stdout;
     holds(
         &text,
         [

@@ -15,7 +15,7 @@ fn suite() -> String {
 /// A bench with a scan of the suite's patient.
 fn scanned() -> Bench {
     let bench = Bench::with_scenario(&suite());
-    bench.run(&SCAN).exits_with(0);
+    bench.run(SCAN).exits_with(0);
     bench
 }
 
@@ -114,7 +114,7 @@ fn a_run_begins_with_a_scan_and_is_measured_against_the_true_lesion() {
     let (_, rest) = rest.split_once("[planning]").unwrap();
     let bench = Bench::with_scenario(&format!("{first}[planning]{rest}"));
     let arguments = "run s.toml --engine rapier --no-page --no-pictures --quiet --json";
-    let report = bench.run(&arguments).exits_with(0).json();
+    let report = bench.run(arguments).exits_with(0).json();
     assert_eq!(report["verdict"], "pass");
     let criteria = report["criteria"].to_string();
     assert!(criteria.contains("max_true_target_error_mm"), "{criteria}");

@@ -172,7 +172,7 @@ fn series_are_listed_and_never_mixed() {
     has_keys(finding, "file message hint");
     let hint = finding["hint"].word();
     holds(
-        &hint,
+        hint,
         ["4: 2 slices of 16 x 12, axial, 5 mm thick, kernel B30f"],
     );
     assert!(hint.contains("5: 3 slices"), "{hint}");

@@ -17,10 +17,10 @@ fn build() -> Bench {
     bench.write("s.toml", text);
     let scan =
         "ct synth s.toml --out ct --markers ct-sphere --pixels 300 --preset biopsy --no-labels";
-    bench.run(&scan).exits_with(0);
+    bench.run(scan).exits_with(0);
     let build = "ct build ct/ct.nii.gz --out patient --lesion nodule=-107,10,35 --thickness-mm 2.5 \
                  --markers ct/marker_list.toml --room s.toml --no-pictures";
-    bench.run(&build).exits_with(0);
+    bench.run(build).exits_with(0);
     bench
 }
 
@@ -28,7 +28,7 @@ fn build() -> Bench {
 fn routes_in_a_scan_are_planned_with_the_robot_written_and_checked() {
     let bench = built();
     let arguments = "ct routes patient --directions 3000 --write patient/planned.toml --json";
-    let found = bench.run(&arguments).exits_with(0).json();
+    let found = bench.run(arguments).exits_with(0).json();
     has_keys(&found, "schema_version ok findings targets remarks written");
     let target = &found["targets"][0];
     assert_eq!(target["goal"], "nodule");
@@ -91,7 +91,7 @@ fn routes_in_a_scan_are_planned_with_the_robot_written_and_checked() {
     assert_eq!(checked["ok"], true);
     // The same on another number of threads.
     let alone = "ct routes patient --directions 3000 --json --jobs 1 --out other";
-    let again = bench.run(&alone).exits_with(0).json();
+    let again = bench.run(alone).exits_with(0).json();
     assert_eq!(again["targets"], found["targets"]);
     let entry = numbers(&route["entry_in_phantom_m"]);
     assert_eq!(entry.len(), 3);
@@ -114,11 +114,11 @@ fn what_cannot_be_planned_is_said() {
     // Without markers nobody knows where the robot is: routes by the patient alone, and why.
     let build = "ct build ct/ct.nii.gz --out unregistered --lesion nodule=-107,10,35 --thickness-mm 2.5 \
                  --room s.toml --no-pictures";
-    bench.run(&build).exits_with(0);
+    bench.run(build).exits_with(0);
     let arguments = "ct routes unregistered --directions 1000 --json";
-    let found = bench.run(&arguments).exits_with(0).json();
+    let found = bench.run(arguments).exits_with(0).json();
     let why = found["targets"][0]["robot_not_asked"].word();
-    holds(&why, ["markers", "--assume-room"]);
+    holds(why, ["markers", "--assume-room"]);
     assert_eq!(
         found["targets"][0]["routes"][0]["configurations"],
         serde_json::json!([])

@@ -31,7 +31,7 @@ fn a_scenario_gives_a_volume_labels_and_a_truth_that_names_the_robot() {
     let truth = bench.read_json("ct/truth.json");
     assert_eq!(made["truth"], truth);
     let keys = "scanner materials_hu seed ct_from_index robot_from_ct lesions markers";
-    has_keys(&truth, &keys);
+    has_keys(&truth, keys);
     let size = numbers(&truth["size"]);
     assert_eq!(size[..2], [96.0, 96.0]);
     assert_eq!(bench.tree("ct/dicom").len() as f64, size[2]);

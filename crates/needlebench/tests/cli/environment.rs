@@ -198,7 +198,7 @@ fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
         "{asked}"
     );
 
-    let ready = bench.run_with(&offline, &prepare).exits_with(0).json();
+    let ready = bench.run_with(&offline, prepare).exits_with(0).json();
     assert_eq!(ready["made"], true);
     let folder = ready["folder"].word();
     assert!(folder.starts_with(&cache), "{ready}");
@@ -219,7 +219,7 @@ fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
     let mut bytes = bench.read(&format!("wheels/{name}"));
     *bytes.last_mut().unwrap() ^= 1;
     bench.write(&format!("wheels/{name}"), bytes);
-    let refused = bench.run_with(&offline, &prepare).exits_with(3);
+    let refused = bench.run_with(&offline, prepare).exits_with(3);
     refused.complains([name, "is damaged", "hint: needlebench doctor --download"]);
     assert!(
         !bench

@@ -46,7 +46,7 @@ fn each_format_is_written_where_results_go_and_says_what_it_is() {
 fn a_file_can_be_named_and_what_belongs_to_it_is_beside_it() {
     let bench = Bench::with_scenario(SMALL);
     let words = "export s.toml --as urdf --out a/b/robot.xacro";
-    bench.run(&words).exits_with(0);
+    bench.run(words).exits_with(0);
     let tree = bench.tree("a/b");
     for name in ["robot.xacro", "robot.srdf", "robot_meshes/package.xml"] {
         assert!(tree.contains(&name.into()), "{tree:?}");
@@ -54,7 +54,7 @@ fn a_file_can_be_named_and_what_belongs_to_it_is_beside_it() {
     // Where its name is that of another file of the same export.
     let words = "export s.toml --as urdf --out c/robot.srdf";
     bench
-        .run(&words)
+        .run(words)
         .exits_with(2)
         .complains(["robot.srdf", "--out", "hint: "]);
     assert!(!bench.path("c/robot.srdf").exists());
@@ -64,7 +64,7 @@ fn a_file_can_be_named_and_what_belongs_to_it_is_beside_it() {
 fn the_only_goal_need_not_be_named() {
     let bench = Bench::with_scenario(SMALL);
     let words = "export s.toml --as gltf --configuration Right-Up-Fold";
-    bench.run(&words).exits_with(0);
+    bench.run(words).exits_with(0);
     let first = bench.read("out/small/small.glb");
     let named = format!("{words} --goal pose");
     bench.run(&named).exits_with(0);

@@ -33,12 +33,12 @@ fn a_configuration_that_does_not_work_is_refused_with_its_reason() {
 fn a_recording_is_the_same_from_an_export_and_from_a_run_and_again() {
     let bench = bench();
     let export = "export table3.toml --as mcap --json";
-    let answer: Value = bench.run(&export).exits_with(0).json();
+    let answer: Value = bench.run(export).exits_with(0).json();
     let file = answer["files"][0]["name"].word().to_owned();
     assert_eq!(file, "out/table3/export/pose/Right-Up-Fold.rapier.mcap");
     let first = bench.read(&file);
     assert!(first.starts_with(b"\x89MCAP"));
-    bench.run(&export).exits_with(0);
+    bench.run(export).exits_with(0);
     assert_eq!(bench.read(&file), first);
     bench
         .run("run table3.toml --engine rapier --record mcap --jobs 1 --no-page --no-pictures --quiet --out results")

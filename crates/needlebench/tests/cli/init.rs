@@ -35,7 +35,8 @@ fn every_variant_passes_check_or_is_refused() {
         for arm in ARMS {
             for phantom in choices["phantoms"].list() {
                 for lesion in choices["lesions"].list() {
-                    let [phantom, lesion] = [phantom, &lesion["name"]].map(|each| each.word());
+                    let [phantom, lesion] =
+                        [phantom, &lesion["name"]].map(super::support::Json::word);
                     let arguments = format!(
                         "init v.toml --force --from {template} --arm {arm} --phantom {phantom} \
                          --lesion {lesion}"

@@ -130,7 +130,7 @@ fn the_log_of_a_run_is_analysed_to_the_same_numbers() {
     let report = bench.read_json("out/small/report.json");
     let arguments = "iso9283 --csv out/small/attained.rapier.csv --commanded out/small/commanded.csv \
                      --json --out again";
-    let answer = bench.run(&arguments).exits_with(0).json();
+    let answer = bench.run(arguments).exits_with(0).json();
     let simulated = &report["iso9283"]["engines"]["rapier"];
     for key in [
         "poses",
@@ -226,7 +226,7 @@ fn a_tracker_in_its_own_frame_is_told_how_to_go_on() {
     }
     bench.write("log.csv", log);
     let plain = "iso9283 --csv log.csv --commanded commanded.csv";
-    let answer = bench.run(&plain).exits_with(0);
+    let answer = bench.run(plain).exits_with(0);
     answer.says(["--fit-frame"]);
     let fitted = bench.run(format!("{plain} --fit-frame --json"));
     let report = fitted.exits_with(0).json();

@@ -238,9 +238,9 @@ fn exact_matrix_is_solved_like_its_vector() {
     let bench = Bench::new();
     // Half a turn about x.
     let by_matrix = "ik --matrix '1,0,0,0.3, 0,-1,0,0.2, 0,0,-1,0.1' --json";
-    let by_matrix = bench.run(&by_matrix).exits_with(0).json();
+    let by_matrix = bench.run(by_matrix).exits_with(0).json();
     let by_pose = "ik --pose 0.3,0.2,0.1,3.141592653589793,0,0 --json";
-    let by_pose = bench.run(&by_pose).exits_with(0).json();
+    let by_pose = bench.run(by_pose).exits_with(0).json();
     assert!(by_matrix["count"].as_u64().unwrap() >= 2);
     assert_eq!(by_matrix["count"], by_pose["count"]);
     for (a, b) in solutions(&by_matrix).iter().zip(solutions(&by_pose)) {

@@ -74,7 +74,7 @@ fn a_name_that_static_studies_lack_is_answered_by_their_own_and_said() {
     let bench = Bench::with_scenario(SMALL);
     bench.write("study.toml", study("static"));
     let arguments = "study study.toml --quiet --no-page";
-    bench.run(&arguments).exits_with(0);
+    bench.run(arguments).exits_with(0);
     let compare = |limit: &str| {
         let study = "out/static";
         bench.run(format!("compare {study} {study} --max-loss {limit}"))

@@ -43,13 +43,13 @@ fn texts_of_a_scenario_stay_texts() {
 fn without_a_page_an_earlier_one_does_not_stay() {
     let bench = Bench::with_scenario(SMALL);
     let arguments = "run s.toml --engine rapier";
-    bench.run(&arguments).exits_with(0);
+    bench.run(arguments).exits_with(0);
     assert!(bench.path("out/small/report.html").exists());
     let without = format!("{arguments} --no-page");
     bench.run(&without).exits_with(0);
     assert!(!bench.path("out/small/report.html").exists());
     let atlas = "atlas s.toml --rolls 12 --no-pictures";
-    bench.run(&atlas);
+    bench.run(atlas);
     assert!(bench.path("out/small/atlas.html").exists());
     bench.run(format!("{atlas} --no-page"));
     assert!(!bench.path("out/small/atlas.html").exists());

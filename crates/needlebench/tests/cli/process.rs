@@ -76,7 +76,7 @@ impl LongRun {
         let bench = Bench::with_scenario(&long_scenario());
         let arguments = "run s.toml --engine both --jobs 2";
         let child = bench
-            .command(&arguments)
+            .command(arguments)
             .process_group(0)
             .stdout(Stdio::null())
             .stderr(Stdio::null())

@@ -78,7 +78,7 @@ impl Log {
 fn plan_keeps_what_is_asked_for_and_is_the_same_again() {
     let bench = Bench::new();
     let arguments = "record-plan --arm ur3e --poses 12 --json";
-    let plan = bench.run(&arguments).exits_with(0).json();
+    let plan = bench.run(arguments).exits_with(0).json();
     assert!(plan["planned"]["minimum_certified_m"].number() >= 0.005);
     for motion in plan["motions"].list() {
         for (class, found) in motion["clearance"].as_object().unwrap() {
@@ -98,7 +98,7 @@ fn plan_keeps_what_is_asked_for_and_is_the_same_again() {
         "plan.json",
     ];
     let written = names.map(|name| bench.read(&format!("out/ur3e/{name}")));
-    bench.run(&arguments).exits_with(0);
+    bench.run(arguments).exits_with(0);
     assert_eq!(
         written,
         names.map(|name| bench.read(&format!("out/ur3e/{name}")))
@@ -178,7 +178,7 @@ fn logs_say_what_a_controller_would() {
     let files: Vec<&str> = report["excitation"]["files"]
         .list()
         .iter()
-        .map(|file| file.word())
+        .map(super::support::Json::word)
         .collect();
     assert_eq!(
         files,
@@ -279,7 +279,7 @@ fn actual_angles_are_what_encoders_read() {
 fn any_run_writes_logs_on_request() {
     let bench = Bench::with_scenario(crate::support::SMALL);
     let arguments = "run s.toml --engine rapier --quiet --no-page --rtde";
-    bench.run(&arguments);
+    bench.run(arguments);
     let logs: Vec<_> = bench
         .tree("out/small/pose")
         .into_iter()

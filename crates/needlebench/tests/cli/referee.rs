@@ -69,7 +69,7 @@ fn difference_beyond_the_envelope_fails_and_is_explained() {
     assert!(!broken.is_empty());
     for criterion in broken {
         let detail = criterion["detail"].word();
-        holds(&detail, ["engines differ from", "likely cause:", " ms"]);
+        holds(detail, ["engines differ from", "likely cause:", " ms"]);
     }
     for configuration in simulated(&report) {
         let quantities = configuration["adjudication"]["quantities"].as_array();

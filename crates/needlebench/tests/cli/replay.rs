@@ -160,7 +160,7 @@ fn a_recorded_run_of_ours_gives_back_what_was_put_in() {
     const INTERVALS: f64 = 2.5;
     let bench = Bench::new();
     let plan = "record-plan --arm ur3e --poses 12 --payload-kg 0.8 --out out";
-    bench.run(&plan).exits_with(0);
+    bench.run(plan).exits_with(0);
     let mut scenario = bench.text("out/ur3e/excitation.toml");
     scenario += "\n[imperfections.calibration]\narm = \"population\"\n[imperfections.friction]\n\
                  [imperfections.encoder]\n";

@@ -153,7 +153,7 @@ fn the_summary_takes_no_markup_from_a_description() {
         ),
     );
     let run = "run s.toml --engine rapier --no-pictures --no-page";
-    bench.run(&run).exits_with(0);
+    bench.run(run).exits_with(0);
     let summary = bench.text("out/small/summary.md");
     let line = summary.lines().nth(2).unwrap();
     assert_eq!(line, "\\<b>bold\\</b> \\*\\*x\\*\\* # head \\\\u{1b}[31m");

@@ -408,8 +408,8 @@ fn quiet_run_writes_nothing_to_standard_error() {
     assert_eq!(bench.run(&quiet).exits_with(0).stderr, "");
     // As does a job that has switched progress off.
     let off = [("NEEDLEBENCH_PROGRESS", Some("off"))];
-    assert_eq!(bench.run_with(&off, &run).exits_with(0).stderr, "");
+    assert_eq!(bench.run_with(&off, run).exits_with(0).stderr, "");
     // In a log there are lines of progress alone.
-    let lines = bench.run(&run).exits_with(0).stderr;
+    let lines = bench.run(run).exits_with(0).stderr;
     assert!(lines.lines().all(|line| line.starts_with('[')), "{lines}");
 }

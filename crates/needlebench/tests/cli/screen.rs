@@ -24,7 +24,7 @@ fn run_prints_one_screen_with_the_verdict_first() {
     let bench = Bench::with_scenario(SMALL);
     let run = "run s.toml --engine rapier --no-page";
     for columns in ["80", "100", "200"] {
-        let lines = lines(&bench, columns, &run);
+        let lines = lines(&bench, columns, run);
         assert!(lines[0].starts_with("PASS small: "), "{lines:#?}");
         assert!(lines[1].starts_with("recommended: Right-"), "{lines:#?}");
         assert!((15..=40).contains(&lines.len()), "{lines:#?}");
@@ -46,7 +46,7 @@ fn run_prints_one_screen_with_the_verdict_first() {
 fn wide_prints_all_tables_however_wide() {
     let bench = Bench::with_scenario(SMALL);
     let run = "run s.toml --engine rapier --no-page --wide";
-    let lines = lines(&bench, "80", &run);
+    let lines = lines(&bench, "80", run);
     let text = lines.join("\n");
     holds(
         &text,
@@ -73,7 +73,7 @@ fn several_goals_are_summed_up_and_not_listed() {
     let text = SMALL.replacen("[[goals]]", &format!("[[goals]]{second}\n\n[[goals]]"), 1);
     let bench = Bench::with_scenario(&text);
     let run = "run s.toml --engine rapier --no-page";
-    let lines = lines(&bench, "80", &run);
+    let lines = lines(&bench, "80", run);
     let text = lines.join("\n");
     assert!(lines.len() <= 40, "{text}");
     assert!(text.contains("guide blocked"), "{text}");

@@ -22,7 +22,7 @@ fn entries(answer: &Value) -> &Vec<Value> {
 fn proposed_entries_lie_on_the_skin_and_pass_check() {
     let bench = Bench::with_scenario(&suite());
     let arguments = "suggest s.toml --goal right_upper_anterior --places 0 --json";
-    let answer = bench.run(&arguments).exits_with(0).json();
+    let answer = bench.run(arguments).exits_with(0).json();
     assert_eq!(entries(&answer).len(), 3);
     for entry in entries(&answer) {
         let direction = numbers(&entry["direction_deg"]);
@@ -67,7 +67,7 @@ fn proposed_entries_lie_on_the_skin_and_pass_check() {
 fn proposed_places_pass_check_for_all_goals() {
     let bench = Bench::with_scenario(&suite());
     let arguments = "suggest s.toml --entries 0 --places 2 --json";
-    let answer = bench.run(&arguments).exits_with(0).json();
+    let answer = bench.run(arguments).exits_with(0).json();
     let places = answer["places"]["places"].list();
     assert_eq!(places.len(), 2);
     for place in places {
@@ -106,7 +106,7 @@ fn a_scenario_is_written_that_passes_check_and_keeps_its_comments() {
     let bench = Bench::with_scenario(&suite());
     let arguments =
         "suggest s.toml --lesion left_lower_lobe --places 1 --write new.toml --out maps";
-    let said = bench.run(&arguments).exits_with(0).stdout;
+    let said = bench.run(arguments).exits_with(0).stdout;
     assert!(said.contains("next: needlebench run new.toml"), "{said}");
     let text = bench.text("new.toml");
     assert!(text.contains("name = \"new\""), "{text}");
@@ -127,7 +127,7 @@ fn a_scenario_is_written_that_passes_check_and_keeps_its_comments() {
         );
     }
     bench
-        .run(&arguments)
+        .run(arguments)
         .exits_with(2)
         .complains(["new.toml", "--force"]);
 }
@@ -137,7 +137,7 @@ fn where_there_is_no_entry_it_says_which_rule_refuses_most() {
     let short = suite().replace("needle_length_mm = 200", "needle_length_mm = 70");
     let bench = Bench::with_scenario(&short);
     let arguments = "suggest s.toml --lesion left_lower_lobe --entries 1 --places 0";
-    let said = bench.run(&arguments).exits_with(1).stdout;
+    let said = bench.run(arguments).exits_with(1).stdout;
     holds(&said, ["none: of", "most often: needle too short"]);
 }
 
@@ -150,7 +150,7 @@ fn proposals_for_every_phantom_and_lesion_pass_check() {
     let (mut proposed, mut none) = (0, 0);
     for phantom in choices["phantoms"].list() {
         for lesion in choices["lesions"].list() {
-            let [phantom, lesion] = [phantom, &lesion["name"]].map(|each| each.word());
+            let [phantom, lesion] = [phantom, &lesion["name"]].map(super::support::Json::word);
             let text = format!("[phantom]\nmodel = \"{phantom}\"\n");
             bench.write("s.toml", &text);
             let arguments = format!("suggest s.toml --lesion {lesion} --places 0 --json");

@@ -175,6 +175,7 @@ impl Bench {
     }
 
     /// The program in this folder, free of the settings of whoever runs the tests.
+    #[expect(clippy::needless_pass_by_value, reason = "reads best without a sign")]
     pub fn command(&self, arguments: impl Arguments) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_needlebench"));
         command
