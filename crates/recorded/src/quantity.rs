@@ -62,8 +62,11 @@ enum Numbers {
 /// columns), number of columns, and what their numbers are.
 const HEADINGS: [(Quantity, &str, usize, Numbers); 20] = {
     use Numbers::{Angles, Measured, OfTheRow, Times};
-    #[expect(clippy::enum_glob_use, reason = "the table names all of them")]
-    use Quantity::*;
+    use Quantity::{
+        ActualCurrent, ActualQ, ActualQd, ActualTcp, ActualTorque, JointMode, Payload, PayloadCog,
+        PayloadInertia, RobotCurrent, RobotMode, RobotStatusBits, SafetyMode, TargetCurrent,
+        TargetMoment, TargetQ, TargetQd, TargetQdd, Temperature, Time,
+    };
     [
         (Time, "timestamp", 1, Times),
         (TargetQ, "target_q", 6, Angles),
