@@ -376,7 +376,7 @@ mod tests {
             assert_eq!(
                 named,
                 [
-                    &format!("mujoco-core=={} \\", MUJOCO_VERSION),
+                    &format!("mujoco-core=={MUJOCO_VERSION} \\"),
                     &format!("numpy=={numpy} \\")
                 ],
                 "Python {python}"

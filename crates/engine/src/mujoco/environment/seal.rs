@@ -194,7 +194,7 @@ mod tests {
         assert_eq!(look(cache.path(), "another key"), Found::Nothing);
         let seal = cache.path().join(SEAL);
         let text = fs::read_to_string(&seal).unwrap();
-        let shorter = &text[..text.trim_end().rfind('\n').unwrap() + 1];
+        let shorter = &text[..=text.trim_end().rfind('\n').unwrap()];
         for changed in [shorter, &text.replace(" venv", " Venv"), ""] {
             fs::write(&seal, changed).unwrap();
             assert_eq!(look(cache.path(), "key"), Found::Nothing);
