@@ -202,11 +202,16 @@ impl<'a> Chart<'a> {
                 load(&block.cos_234),
                 load(&block.sin_234),
             ];
-            let mut posture = self.posture(simd, &pose, &place);
-            for _ in 1..rounds {
+            let mut left = rounds;
+            // Stands here once: it is long, and compiled for each kind of processor.
+            let posture = loop {
+                let posture = self.posture(simd, &pose, &place);
+                left = left.saturating_sub(1);
+                if left == 0 {
+                    break posture;
+                }
                 pose = posture.corrected;
-                posture = self.posture(simd, &pose, &place);
-            }
+            };
             let store = |value: &<S as Simd>::f64s, lanes: &mut Lanes| {
                 value.store_slice(&mut lanes[first..first + width]);
             };

@@ -321,12 +321,23 @@ struct Asked<'a> {
     tolerance: Tolerance,
 }
 
-#[inline]
 fn solve_at(level: Level, asked: &Asked<'_>, pose: &Pose, out: &mut ClosedForm) {
     let bounds = Bounds::new(asked.geometry, asked.tolerance);
-    let certain =
-        dispatch!(level, simd => lanes::one_pose(simd, asked.geometry, &bounds, pose, out));
+    let certain = one_pose_at(level, asked.geometry, &bounds, pose, out);
     out.finish(asked, pose, certain);
+}
+
+/// The vectors' answer, if every sign in it is certain. Compiled once: a kernel for each kind of processor in every
+/// caller, other crates among them, took minutes.
+#[inline(never)]
+fn one_pose_at(
+    level: Level,
+    geometry: &UrGeometry,
+    bounds: &Bounds,
+    pose: &Pose,
+    out: &mut ClosedForm,
+) -> bool {
+    dispatch!(level, simd => lanes::one_pose(simd, geometry, bounds, pose, out))
 }
 
 impl ClosedForm {
@@ -412,7 +423,7 @@ fn batch<S: Simd>(simd: S, asked: &Asked<'_>, poses: &[Pose], out: &mut [ClosedF
     }
     let rest = pose_blocks.remainder().iter();
     for (pose, out) in rest.zip(out_blocks.into_remainder()) {
-        let certain = lanes::one_pose(simd, geometry, &bounds, pose, out);
+        let certain = one_pose_at(simd.level(), geometry, &bounds, pose, out);
         out.finish(asked, pose, certain);
     }
 }

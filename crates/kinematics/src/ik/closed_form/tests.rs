@@ -186,7 +186,7 @@ fn bounds_of_the_fast_path_hold() {
         let q = set.sample(&UR3, &mut random, away_rad);
         let pose = UR3.base_from_flange(&q);
         let mut fast = ClosedForm::BLANK;
-        if !dispatch!(*LEVEL, simd => lanes::one_pose(simd, &UR3, &bounds, &pose, &mut fast)) {
+        if !one_pose_at(*LEVEL, &UR3, &bounds, &pose, &mut fast) {
             continue;
         }
         edge += 1;
