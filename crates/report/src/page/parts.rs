@@ -13,13 +13,13 @@ const STYLE: &str = "main > * { max-width: 1300px; }
 main p { max-width: 80ch; }
 h2 { margin: 26px 0 6px; padding-top: 8px; border-top: 1px solid var(--line); }
 nav a { margin-right: 14px; color: var(--focus); }
-figure { display: inline-block; vertical-align: top; margin: 10px 14px 6px 0; }
+figure { display: inline-block; vertical-align: top; margin: 10px 4px 6px 0; }
 figure svg, figure img { display: block; width: 100%; height: auto; font: 12px system-ui, sans-serif; }
 figcaption { color: var(--soft); }
 main .scroll { margin: 8px 0; }
 th, td { white-space: pre-line; }
-.number { white-space: pre; }
-.formula { font-family: \"STIX Two Math\", \"Cambria Math\", Cambria, Georgia, serif; max-width: 26em; }
+.number, thead th { white-space: pre; }
+td.formula { font-family: \"STIX Two Math\", \"Cambria Math\", Cambria, Georgia, serif; max-width: 26em; }
 .formula sub, .formula sup { font-size: 0.75em; line-height: 0; }
 @media print { figure, tr { break-inside: avoid; } h2 { break-after: avoid; } }
 ";
