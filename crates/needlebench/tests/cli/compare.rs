@@ -177,26 +177,13 @@ fn scenarios_are_run_and_two_layouts_differ_by_their_input() {
 }
 
 #[test]
-fn report_of_a_version_before_rankings_is_read() {
+fn report_without_metrics_is_refused_with_the_place_of_what_it_lacks() {
     let bench = bench(|report| {
-        for each in report["goals"][0]["configurations"].as_array_mut().unwrap() {
-            let keys = each.as_object_mut().unwrap();
-            for key in [
-                "ranking",
-                "pareto",
-                "room",
-                "tip_sensitivity_m_per_rad",
-                "motion",
-                "metrics",
-            ] {
-                keys.remove(key);
-            }
-        }
+        let configuration = report["goals"][0]["configurations"][1].as_object_mut();
+        configuration.unwrap().remove("metrics");
     });
-    let answer = bench.run("compare b.json a.json --wide");
-    let answer = answer.exits_with(0);
-    answer.says(["new"]);
-    compare(&bench, "--max-loss motion_time=1s").exits_with(1);
+    let answer = bench.run("compare b.json a.json").exits_with(2);
+    answer.complains(["`goals[0].configurations[1].metrics` is missing", "b.json"]);
 }
 
 #[test]

@@ -77,7 +77,10 @@ fn credibility_is_collected_from_a_run_and_a_replay() {
         "out/small/replay.json",
         "{\"log\": {\"file\": \"arm.csv\", \"sha256\": \"0f\"}, \"calibration\": {\"held_out\": {\"rms_m\": 8.2e-5}}}",
     );
-    let text = bench.run(&report[..3]).exits_with(0).stdout;
+    let text = bench
+        .run("report out/small --credibility")
+        .exits_with(0)
+        .stdout;
     assert!(
         text.contains("not fitted: 0.082 mm") && !text.contains("No comparator"),
         "{text}"

@@ -177,6 +177,7 @@ fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
         ("PIP_RETRIES", Some("0")),
     ];
     // uv is asked for what has the hashes; where it fails, as this one does, pip is tried.
+    std::fs::create_dir(bench.path("bin")).unwrap();
     bench.write(
         "bin/uv",
         "#!/bin/sh\necho \"$@\" >> uv.log\ntest $1 = venv\n",
