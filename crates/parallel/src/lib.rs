@@ -21,31 +21,35 @@ pub fn in_parallel<T: Sync, R: Send>(
     // Slices of rayon's own are halved first: one thread would begin in the middle.
     let numbered = items.iter().enumerate().par_bridge();
     let results = numbered.map(|(at, item)| (at, f(item)));
-    let mut results: Vec<(usize, R)> = on_threads(threads, || results.collect());
-    results.sort_unstable_by_key(|(at, _)| *at);
-    results.into_iter().map(|(_, result)| result).collect()
+    in_order(on_threads(threads, || results.collect()))
 }
 
 /// Gives parts of `of_each` values, the last one of what is left, to `work` with their numbers, on up to `threads`
-/// threads. What each thread needs beside them it makes for itself by `make`.
-pub fn in_parts<T: Send, S>(
+/// threads; results are in the parts' order. What each thread needs beside them it makes for itself by `make`.
+pub fn in_parts<T: Send, S, R: Send>(
     threads: usize,
     values: &mut [T],
     of_each: usize,
     make: impl Fn() -> S + Sync,
-    work: impl Fn(&mut S, usize, &mut [T]) + Sync,
-) {
+    work: impl Fn(&mut S, usize, &mut [T]) -> R + Sync,
+) -> Vec<R> {
     let threads = threads.min(values.len().div_ceil(of_each));
     let numbered = values.chunks_mut(of_each).enumerate();
     if is_shared_out(threads) {
         let numbered = numbered.par_bridge();
-        on_threads(threads, || {
-            numbered.for_each_init(&make, |own, (at, part)| work(own, at, part));
-        });
+        let results = numbered.map_init(&make, |own, (at, part)| (at, work(own, at, part)));
+        in_order(on_threads(threads, || results.collect()))
     } else {
         let mut own = make();
-        numbered.for_each(|(at, part)| work(&mut own, at, part));
+        numbered
+            .map(|(at, part)| work(&mut own, at, part))
+            .collect()
     }
+}
+
+fn in_order<R>(mut results: Vec<(usize, R)>) -> Vec<R> {
+    results.sort_unstable_by_key(|(at, _)| *at);
+    results.into_iter().map(|(_, result)| result).collect()
 }
 
 fn is_shared_out(threads: usize) -> bool {

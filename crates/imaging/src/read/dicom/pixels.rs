@@ -4,7 +4,7 @@ use std::io::{Read, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rayon::prelude::*;
+use needlebench_parallel::in_parts;
 
 use super::dataset::Pixels;
 use super::file::{self, Bytes};
@@ -343,11 +343,10 @@ where
     let mut hu: Vec<i16> = zeroed(plane * slices.len())?;
     // Slices of one file stay together, so that each thread opens it once.
     let each = slices.len().div_ceil(threads.max(1));
-    let parts = slices.par_chunks(each).zip(hu.par_chunks_mut(plane * each));
-    let work = |(slices, hu): (&[Slice], &mut [i16])| {
+    let work = |(): &mut (), part: usize, hu: &mut [i16]| {
         let mut tally = Tally::default();
         let mut kept = Kept::default();
-        for (slice, out) in slices.iter().zip(hu.chunks_mut(plane)) {
+        for (slice, out) in slices[part * each..].iter().zip(hu.chunks_mut(plane)) {
             if cancel.load(Ordering::Relaxed) {
                 return Err(ImagingError::Interrupted);
             }
@@ -355,7 +354,7 @@ where
         }
         Ok(tally)
     };
-    let outcomes: Vec<Result<Tally, ImagingError>> = parts.map(work).collect();
+    let outcomes = in_parts(threads, &mut hu, plane * each, || (), work);
     let mut tally = Tally::default();
     for outcome in outcomes {
         tally.add(&outcome?);
