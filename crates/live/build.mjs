@@ -54,7 +54,9 @@ function sources() {
   const crates = [...new Set(tree)].sort();
   hash.update(crates.join('\n'));
   const workspace = readFileSync(join(root, 'Cargo.toml'), 'utf8');
-  hash.update(workspace.slice(workspace.indexOf('[profile.')));
+  // What pages' code is compiled by; the profile of tests has no part in it.
+  const profiles = workspace.match(/^\[profile\.(release|page)\b[^[]*/gm) ?? [];
+  hash.update(profiles.join(''));
   for (const name of crates.filter((each) => each.startsWith('needlebench-'))) {
     const folder = join(root, 'crates', name.split(' ')[0].replace('needlebench-', ''));
     for (const path of [join(folder, 'Cargo.toml'), ...files(join(folder, 'src'))]) {
