@@ -5,6 +5,7 @@ use std::path::{Component, Path, PathBuf};
 use toml::{Table, Value};
 
 use crate::scenario::Scenario;
+use crate::toml_value;
 
 /// Sections in the order in which people read them; all others follow by name.
 const FIRST: [&str; 12] = [
@@ -123,7 +124,7 @@ fn remove(table: &mut Table, path: &[Step]) -> bool {
 
 impl Scenario {
     fn deserialize_table(table: &Table) -> Option<Self> {
-        table.clone().try_into().ok()
+        toml_value::read_table(table).ok()
     }
 
     /// For a file in another folder: paths of files that are relative to the folder `from` become relative to `to`.

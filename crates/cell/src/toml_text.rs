@@ -10,6 +10,7 @@ use toml::{Spanned, Table, Value};
 
 use crate::Finding;
 use crate::schema::{FileSchema, Misfit, MisfitKind, Path};
+use crate::toml_value;
 
 /// A parsed file together with where everything stands in it.
 #[derive(Debug)]
@@ -81,8 +82,7 @@ impl<'a> TomlText<'a> {
             return Err(findings);
         }
         // The schema is that of the struct, so this can fail by a mistake of ours alone.
-        T::deserialize(Value::Table(self.values.clone()))
-            .map_err(|error| vec![Finding::new(self.file, error.message())])
+        toml_value::read_table(&self.values).map_err(|error| vec![Finding::new(self.file, error)])
     }
 
     fn misfit(&self, misfit: Misfit) -> Finding {

@@ -1,9 +1,13 @@
 //! Values of other crates as TOML.
 
+mod held;
+
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::Finding;
+
+pub(crate) use held::{read, read_table};
 
 /// A value as TOML.
 ///

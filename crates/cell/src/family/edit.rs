@@ -8,6 +8,7 @@ use super::setting::{Change, Setting, number_value};
 use crate::ArmInUse;
 use crate::scenario::{GoalSection, Scenario};
 use crate::schema::{Misfit, MisfitKind, Path};
+use crate::toml_value;
 
 /// A scenario's struct, and all of it that has a value as a table, defaults included.
 #[derive(Debug, Clone)]
@@ -32,7 +33,7 @@ pub(super) struct Edited {
 macro_rules! put_sections {
     ($scenario:ident, $name:ident, $value:ident, [$($section:ident),*]) => {
         match $name {
-            $(stringify!($section) => $scenario.$section = read($name, $value)?,)*
+            $(stringify!($section) => $scenario.$section = read($name, &$value)?,)*
             _ => return Err(unknown($name, format!("`{}` cannot be changed", $name))),
         }
     };
@@ -96,7 +97,7 @@ impl Editable {
                 return Err(out_of_range.swap_remove(first + at));
             }
             if name == "goal" {
-                scenario.goals = vec![read::<GoalSection>(name, value)?];
+                scenario.goals = vec![read::<GoalSection>(name, &value)?];
                 continue;
             }
             put_sections!(
@@ -277,11 +278,11 @@ fn changed(
 }
 
 /// The schema holds, so this fails by a mistake of ours alone.
-fn read<T: DeserializeOwned>(section: &str, value: Value) -> Result<T, Misfit> {
-    T::deserialize(value).map_err(|error| Misfit {
+fn read<T: DeserializeOwned>(section: &str, value: &Value) -> Result<T, Misfit> {
+    toml_value::read(value).map_err(|message| Misfit {
         key: section.to_owned(),
         kind: MisfitKind::Type,
-        message: error.message().to_owned(),
+        message,
         hint: None,
     })
 }
