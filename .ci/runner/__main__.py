@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import datetime
+import math
 import os
 import platform
 import re
@@ -172,7 +173,9 @@ class Run:
     def figures(self, check: Check) -> dict[str, float]:
         """Those that the check printed as such, and the largest of those that its patterns find."""
         text = self.printed(check)
-        found = {name: float(value) for name, value in FIGURE.findall(text)}
+        found: dict[str, float] = {}
+        for name, value in FIGURE.findall(text):
+            found[name] = max(float(value), found.get(name, -math.inf))
         for name, words in check.figures.items():
             matches = re.findall(words, text, re.MULTILINE)
             if not matches:

@@ -248,6 +248,12 @@ def main() -> int:
         print(
             f"{name:>14}: bias {bias_m * 1e6:6.2f} um ({bias:.2f}), covariance {differs:6.2%} ({covariance:.2f})"
         )
+    of_one = [found for name, found in worst.items() if name != "all"]
+    print(f"figure bias_of_one_um {max(found[2] for found in of_one) * 1e6:.3f}")
+    print(f"figure covariance_of_one_percent {max(found[3] for found in of_one) * 100:.3f}")
+    if "all" in worst:
+        print(f"figure bias_of_all_um {worst['all'][2] * 1e6:.3f}")
+        print(f"figure covariance_of_all_percent {worst['all'][3] * 100:.3f}")
     print(f"{time.monotonic() - began:.1f} s")
     for failure in failures:
         print(f"FAIL: {failure}")

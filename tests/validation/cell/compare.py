@@ -404,6 +404,12 @@ def main() -> int:
     (out / "report.json").write_text(json.dumps(report, default=plain, indent=1) + "\n")
     (out / "report.txt").write_text(text + "\n")
     print(text)
+    apart, deep = (
+        max(getattr(each, f"{kind}_difference_m")["max"] for each in tallies) * 1e9 for kind in ("apart", "penetrating")
+    )
+    print(f"figure postures {sum(each.postures for each in tallies)}")
+    print(f"figure apart_nm {apart:.3g}\nfigure penetrating_nm {deep:.3g}")
+    print(f"figure above_nm {max(each.largest_above_upper_bound.value for each in tallies) * 1e9:.3g}")
     for failure in failures[:20]:
         print(f"error: {failure}", file=sys.stderr)
     if len(failures) > 20:

@@ -222,6 +222,13 @@ fn loader_and_dynamics_agree_with_pinocchio() {
     for case in &reference.cases {
         let worst = compare(&load(case, reference.gravity_m_s2), case);
         println!("{}: {} states, {worst:?}", case.name, case.states.len());
+        // Kept with the records of the checks, which take the largest of several.
+        println!("figure loader_position_m {:e}", worst.position_m);
+        println!("figure loader_angle_rad {:e}", worst.angle_rad);
+        println!("figure loader_mass {:e}", worst.mass);
+        println!("figure loader_gravity {:e}", worst.gravity);
+        println!("figure loader_torque {:e}", worst.torque);
+        println!("figure loader_jacobian {:e}", worst.jacobian);
         assert!(case.states.len() >= 40);
         assert!(worst.position_m < POSITION_M, "{}: {worst:?}", case.name);
         assert!(worst.angle_rad < ANGLE_RAD, "{}: {worst:?}", case.name);

@@ -113,8 +113,10 @@ fn engine_bodies_are_where_forward_kinematics_puts_them() {
         let plants: [&mut dyn Plant; 2] = [&mut rapier, &mut mujoco];
         for plant in plants {
             let worst = worst_pose(&scenario.cell, plant);
-            println!("{name} {}: {worst:e} m or rad", plant.identity().name);
-            assert!(worst < LINK_POSE, "{}: {worst:e}", plant.identity().name);
+            let engine = plant.identity().name;
+            println!("{name} {engine}: {worst:e} m or rad");
+            println!("figure {engine}_pose {worst:e}");
+            assert!(worst < LINK_POSE, "{engine}: {worst:e}");
         }
     }
 }
@@ -157,7 +159,15 @@ fn check_dynamics(scenario: &ResolvedScenario, harness: &mut HarnessProcess) {
             *worst = worst.max(error);
         }
     }
-    println!("mass matrix (rapier, MuJoCo), gravity, inverse dynamics (MuJoCo): {worst:?}");
+    let names = [
+        "rapier_mass",
+        "mujoco_mass",
+        "mujoco_gravity",
+        "mujoco_torque",
+    ];
+    for (name, worst) in names.iter().zip(&worst) {
+        println!("figure {name} {worst:e}");
+    }
     assert!(worst.iter().all(|&error| error < DYNAMICS), "{worst:?}");
 }
 
@@ -192,6 +202,7 @@ fn gravity_torque_holds_arm_and_tool_still() {
         for plant in plants {
             let worst = worst_holding_torque(&scenario.cell, plant);
             println!("{name} {}: {worst:e} N m", plant.identity().name);
+            println!("figure holding_from_rest_nm {worst:e}");
             assert!(worst < HOLDING_TORQUE_NM, "{worst:e}");
         }
     }
@@ -253,6 +264,8 @@ fn engines_agree_along_every_planned_motion() {
         let settled = differences[differences.len() - 1];
         let name = configuration.configuration;
         println!("{name}: tips differ by at most {peak:e} m, at the end by {settled:e} m");
+        println!("figure tips_peak_nm {:e}", peak * 1e9);
+        println!("figure tips_settled_m {settled:e}");
         assert!(peak < PEAK_TIP_M, "{name}: {peak:e}");
         assert!(settled < SETTLED_TIP_M, "{name}: {settled:e}");
         for recording in [&a, &b] {
@@ -265,6 +278,7 @@ fn engines_agree_along_every_planned_motion() {
                 "  {}: holding torque {holding:e} N m",
                 recording.engine.name
             );
+            println!("figure holding_at_the_end_nm {holding:e}");
             assert!(holding < HOLDING_TORQUE_NM, "{name}: {holding:e}");
         }
     }

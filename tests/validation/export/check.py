@@ -77,6 +77,7 @@ def main() -> int:
         print(f"FAILED: {failed}")
         return 1
     print("\n".join(lines))
+    print("\n".join(tally.figure() for tally in tallies.values() if tally.count))
     if deep:
         size = [abs(difference) for difference, _ in deep]
         print(

@@ -1,6 +1,7 @@
 """The program, a scenario's cell as it sees it, and tallies of differences."""
 
 import json
+import re
 import subprocess
 import tomllib
 from dataclasses import dataclass, field
@@ -50,6 +51,11 @@ class Tally:
         self.count += 1
         if not abs(difference) <= self.greatest:
             self.greatest, self.where = abs(difference), where
+
+    def figure(self) -> str:
+        """As the records of the checks have it."""
+        name = re.sub(r"\W+", "_", f"{self.name} {self.unit}".lower()).strip("_")
+        return f"figure {name} {self.greatest:.3e}"
 
     def line(self) -> str:
         """The tally for people; raises where there is nothing, or too much."""

@@ -150,6 +150,8 @@ fn fresh(start: &Start, geometry: &UrGeometry, seed: u64, poses: usize) -> Vec<S
                 tally.false_claims += usize::from(!claim);
             }
             println!("{}", table_line(set, cell, &tally));
+            // Of the records of the checks, which take the largest: m or rad.
+            println!("figure closed_form_residual {:e}", tally.worst);
             complaints.extend(complaint(set, cell, &tally));
         }
     }
