@@ -20,7 +20,7 @@ use crate::{Finding, nearest_name};
 pub use brakes::{BrakeFigure, BrakeFigures};
 pub use choice::Recognition;
 pub(crate) use choice::{choose_arm, note_on_no_arm};
-use data::ArmData;
+pub(crate) use data::ArmData;
 
 /// The arm of scenarios that name none.
 pub(crate) const DEFAULT_ARM: &str = "ur3";

@@ -329,7 +329,7 @@ impl<'de> VariantAccess<'de> for Variant<'de> {
 #[cfg(test)]
 mod tests {
     use super::read_table;
-    use crate::Scenario;
+    use crate::scenario::Scenario;
     use crate::arm::ArmData;
 
     /// The library's own deserializer, of everything that ships.
