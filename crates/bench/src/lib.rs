@@ -6,6 +6,7 @@
 //!
 //! A run is a row of stages, each of which takes what those before it made: `plan`, `simulate`,
 //! `events`, `adjudication`, `budgets`, `assemble`. A case of a study goes through the same ones.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 // Its functions are called by name, from wherever the C library's would be.
 use needlebench_elementary as _;

@@ -22,6 +22,7 @@
 //! | `excitation_text`, `scenario_edit`, `scenario_text` | the text of a scenario: given a run that excites every joint, changed key by key, or written anew |
 //! | [`family`], [`study`], `thresholds` | many scenarios from one, and what is asked of them |
 //! | `log_columns`, `marker_list` | which column of a recorded log is what; where markers are |
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 pub mod arm;
 mod delimited;

@@ -1,4 +1,5 @@
-#![doc = include_str!("../README.md")]
+//! Signed clearances of an arm among solids, of postures and proven along motions.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 //!
 //! ## In this crate
 //!

@@ -7,6 +7,7 @@
 //! here: to depend on this crate is enough.
 //!
 //! `tests/validation/arithmetic/check.py` looks whether the program takes any of them from elsewhere.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 #![expect(
     unsafe_code,

@@ -5,6 +5,7 @@
 //! any engine with the [`Servo`], one after the other or several at a time, and hands over a
 //! [`Recording`] of each. All plants are built from the one [`Cell`](needlebench_cell::Cell), so that
 //! what differs between their recordings is the engines' doing.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod actuation;
 mod brakes;

@@ -1,6 +1,7 @@
 //! Recordings to measurements, criteria and the report.
 //!
 //! Definitions are those of the field: see each field's documentation. SI units and radians.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 pub mod accuracy;
 pub mod adjudication;

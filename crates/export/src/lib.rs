@@ -3,6 +3,7 @@
 //!
 //! One public function for each format, which gives [`ExportedFile`]s. Nothing here prints or writes.
 //! Joints and links have the names that ROS gives them. The same scenario gives the same bytes.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod error;
 mod file;

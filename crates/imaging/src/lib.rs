@@ -5,6 +5,7 @@
 //! row, slice. A volume of n columns spans -0.5 to n - 0.5.
 //!
 //! Names and birth dates of patients are never read into any value of this crate.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod components;
 mod distance;

@@ -1,4 +1,5 @@
-#![doc = include_str!("../README.md")]
+//! Kinematics and rigid-body dynamics of UR arms.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod chain;
 // Numerics that the testbench shares, hidden from the documentation: no part of what this crate promises.

@@ -7,6 +7,7 @@
 //! [`needlebench_kinematics::ik::Kinematics`].
 //!
 //! All of it is of one posture. Nothing is said of motions.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 #[cfg(target_arch = "wasm32")]
 mod exports;

@@ -4,6 +4,7 @@
 //! Table 3 under its true labels, every equation as printed and as corrected, accuracy and time of
 //! both methods, convergence of the numerical one, and Figure 6. Everything is computed when it is
 //! asked for, from fixed seeds: two runs differ in their timings only.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod accuracy;
 mod charts;

@@ -3,6 +3,7 @@
 //! Threads are started for the work and end with it: a pool that outlives a call is of no use to a process that was
 //! forked, such as those of Python's `multiprocessing`. Work that is part of other such work stays on its thread: there
 //! are never more threads than were asked for, and none begins another item while one that it has begun waits.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 use rayon::prelude::*;
 use rayon::{ThreadBuilder, ThreadPoolBuilder};

@@ -2,6 +2,7 @@
 //!
 //! For each goal all eight configurations get a [`ConfigurationPlan`], never fewer: one that
 //! cannot work carries the rules that reject it, the first failing one first.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod blocked;
 pub mod excitation;

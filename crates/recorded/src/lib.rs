@@ -4,6 +4,7 @@
 //! is guessed. [`arm_fits`] says which arm it is of, [`calibrate`] how its links differ from the nominal
 //! ones, [`identify`] what it weighs and rubs. Each figure comes with an interval, or with why the run
 //! does not show it, and with the error on rows that it was not made from.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod arm_fit;
 mod calibration;

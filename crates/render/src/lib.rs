@@ -5,6 +5,7 @@
 //! outside only, blended back to front at every sample, so that what is within a translucent skin
 //! stays visible. Two by two samples per pixel smooth the edges. What cannot be drawn (vertices
 //! that are not finite, indices out of range, anything behind the camera) is left out.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod camera;
 mod color;

@@ -1,5 +1,6 @@
 //! Results for people and other programs: tables, Markdown, JUnit, CSV, charts, pictures and pages,
 //! and the folders that they are written into.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 pub mod accuracy;
 pub mod chart;

@@ -8,6 +8,7 @@
 //!
 //! Whether a robot reaches a direction is asked elsewhere. Metres and radians throughout; frame `phantom` is the
 //! patient's (left, posterior, superior).
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod anatomy;
 mod directions;

@@ -4,6 +4,7 @@
 //! rerun alone. Each case gives one [`Row`] per configuration, with a value for each of the study's
 //! [columns](MetricColumn). What computes the rows is a [`CaseWorker`], and what the columns are is
 //! said when a study is opened; this crate knows neither arms nor engines.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod case;
 mod column;

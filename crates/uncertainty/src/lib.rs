@@ -10,6 +10,7 @@
 //! A [`Truth`] is one arm and one patient: what the engines simulate. The [`budget`] says how far the
 //! needle's tip is off over all arms and patients, by source, analytically and by Monte Carlo; the
 //! two share no formula but the model of each source. `tests/validation/budget` shares neither.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 pub mod budget;
 mod distribution;

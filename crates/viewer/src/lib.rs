@@ -6,6 +6,7 @@
 //! [`session`].
 //!
 //! Voxels are told by index, places in millimetres of `ct` (patient LPS); the server alone turns one into the other.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod answer;
 mod around;
