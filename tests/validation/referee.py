@@ -17,7 +17,8 @@ def main() -> None:
     report = json.loads(Path(sys.argv[1]).read_text())
     found = [
         each
-        for configuration in report["configurations"]
+        for goal in report["goals"]
+        for configuration in goal["configurations"]
         for each in (configuration.get("referee") or {}).values()
     ]
     if not found:
