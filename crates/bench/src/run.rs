@@ -40,6 +40,9 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<ScenarioRun, RunError> {
     let engines = options.chosen_engines(runnable.scenario())?;
+    let name = &*runnable.scenario().scenario.name;
+    let _stage = tracing::info_span!("run", scenario = name).entered();
+    tracing::info!(engines = ?engine_names(&engines), threads = options.jobs, "begins");
     let control = Control {
         threads: options.jobs,
         cancel,
@@ -81,8 +84,10 @@ fn run_goals(
     let pool = EnginePool::new(engines);
     let plans = plan_while_engines_start(&setup, &pool, engines, control);
     timings.lap("planning_s");
+    tell_plans(resolved, &plans);
 
     let jobs = jobs(&setup, &plans);
+    tracing::info!(motions = jobs.len(), "simulates in each engine");
     let simulation = Simulation {
         setup: &setup,
         plans: &plans,
@@ -96,6 +101,7 @@ fn run_goals(
         simulation.run_in(&pool, *engine, control)
     });
     timings.lap("simulation_s");
+    tracing::info!("simulated");
     for made in &simulated {
         timings.of_engine(made);
     }
@@ -124,7 +130,13 @@ fn run_goals(
     }
     identities.extend(adjudications.identity);
 
+    tracing::info!(
+        events = events.len(),
+        failures = failures.len(),
+        "events staged"
+    );
     let budgets = budgets(&setup, &plans, control.threads);
+    tracing::info!("error budgets computed");
     let interrupted = control.is_cancelled();
     let results = Results {
         plans: &plans,
@@ -158,6 +170,27 @@ fn run_goals(
         interrupted,
         real_arm,
     })
+}
+
+/// What was decided of each configuration.
+fn tell_plans(resolved: &ResolvedScenario, plans: &[GoalPlan]) {
+    for (goal, plan) in resolved.goals.iter().zip(plans) {
+        let _stage = tracing::info_span!("plan", goal = %goal.name).entered();
+        for each in &plan.configurations {
+            match each.rejections.first() {
+                None => tracing::info!(configuration = %each.configuration, "works"),
+                Some(first) => tracing::info!(
+                    configuration = %each.configuration,
+                    rule = first.rule.name(),
+                    value = first.value,
+                    limit = first.limit,
+                    unit = first.unit,
+                    detail = first.detail,
+                    "cannot work"
+                ),
+            }
+        }
+    }
 }
 
 /// Plans all goals; what engines need is started meanwhile.

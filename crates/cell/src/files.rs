@@ -113,10 +113,12 @@ impl Location {
 
     pub(crate) fn read(&self) -> Result<Vec<u8>, String> {
         match self {
-            Self::Builtin(path) => BUILTIN
-                .get_file(path)
-                .map(|file| file.contents().to_vec())
-                .ok_or_else(|| "no such shipped model".to_owned()),
+            Self::Builtin(path) => {
+                let file = BUILTIN.get_file(path);
+                let bytes = file.map(|file| file.contents().to_vec());
+                tracing::trace!(file = %self.display(), found = bytes.is_some(), "read what ships");
+                bytes.ok_or_else(|| "no such shipped model".to_owned())
+            }
             Self::Disk(path) => read_data(path).map_err(|error| error.to_string()),
         }
     }

@@ -105,6 +105,7 @@ fn read(path: &Path, limit: u64) -> Result<Vec<u8>, InputError> {
     if bytes.len() as u64 > limit {
         return Err(InputError::TooLarge { limit });
     }
+    tracing::debug!(file = %path.display(), bytes = bytes.len(), "read");
     Ok(bytes)
 }
 

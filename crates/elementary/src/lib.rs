@@ -8,7 +8,6 @@
 //!
 //! `tests/validation/arithmetic/check.py` looks whether the program takes any of them from elsewhere.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
-
 #![expect(
     unsafe_code,
     reason = "functions are exported by name: one attribute, which counts as unsafe"

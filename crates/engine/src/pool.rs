@@ -124,9 +124,16 @@ impl EnginePool {
     ) -> Result<MutexGuard<'_, State>, EngineError> {
         let mut state = self.state(engine);
         if let State::Idle = *state {
+            let _stage = tracing::debug_span!("start", engine = engine.name()).entered();
             *state = match engine.start(settings, tell) {
-                Ok(session) => State::Started(session),
-                Err(error) => State::Failed(error.to_string()),
+                Ok(session) => {
+                    tracing::info!(process = session.process_id(), "engine started");
+                    State::Started(session)
+                }
+                Err(error) => {
+                    tracing::warn!(%error, "engine could not be started");
+                    State::Failed(error.to_string())
+                }
             };
         }
         if let State::Failed(reason) = &*state {

@@ -21,6 +21,7 @@ use crate::command::{
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::host::{Invocation, hosted};
+use crate::log::{LogLevel, told};
 use crate::output::{complain, keep_to_width, print_as_it_is};
 
 /// Testbench for needle-guide robots: which of the eight arm configurations put the needle guide
@@ -32,6 +33,9 @@ use crate::output::{complain, keep_to_width, print_as_it_is};
                         3 the environment or an engine failed, 130 interrupted."
 )]
 struct Cli {
+    /// Tell what was read, decided and skipped, on standard error.
+    #[arg(long = "log", global = true, value_enum, value_name = "LEVEL")]
+    log_level: Option<LogLevel>,
     #[command(subcommand)]
     command: Command,
 }
@@ -230,7 +234,12 @@ fn caught(run: impl FnOnce() -> ExitStatus) -> ExitStatus {
 fn run(cli: Cli) -> ExitStatus {
     clock::start();
     keep_to_width();
-    let result = match cli.command {
+    let result = told(cli.log_level, || carried_out(cli.command));
+    result.unwrap_or_else(Failure::tell)
+}
+
+fn carried_out(command: Command) -> Result<ExitStatus, Failure> {
+    match command {
         Command::Init(arguments) => command::init(&arguments),
         Command::Suggest(arguments) => command::suggest(&arguments),
         Command::Run(arguments) => command::run(&arguments),
@@ -257,8 +266,7 @@ fn run(cli: Cli) -> ExitStatus {
         Command::Doctor(arguments) => command::doctor(&arguments),
         Command::Licences => command::licences(),
         Command::Completions { shell } => command::completions(shell, &mut command_line()),
-    };
-    result.unwrap_or_else(Failure::tell)
+    }
 }
 
 #[cfg(test)]

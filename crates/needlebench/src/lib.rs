@@ -1,6 +1,7 @@
 //! The command line of the testbench, for a terminal and for programs that have it inside ([`invoke`]).
 //!
 //! Data goes to standard output, logs and progress to standard error.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod arguments;
 mod cli;
@@ -11,6 +12,7 @@ mod failure;
 mod findings;
 mod host;
 mod interrupts;
+mod log;
 mod output;
 mod progress;
 

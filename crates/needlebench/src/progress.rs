@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use needlebench_bench::progress::Progress;
 
 use crate::host;
+use crate::log;
 use crate::output::complain;
 
 /// Environment variable that switches it off, for whole jobs.
@@ -47,7 +48,7 @@ impl TerminalProgress {
             return Self::Hidden;
         }
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-        if bar.is_hidden() {
+        if bar.is_hidden() || log::is_told() {
             return Self::Log(Mutex::new(Log::new(Instant::now())));
         }
         bar.set_length(0);

@@ -105,6 +105,11 @@ pub fn search(
     });
     let mut judged: Vec<(usize, Candidate)> = judged.into_iter().flatten().collect();
     judged.sort_by_key(|(index, _)| *index);
+    tracing::info!(
+        asked = count,
+        judged = judged.len(),
+        "directions of the needle"
+    );
     Searched {
         candidates: judged.into_iter().map(|(_, candidate)| candidate).collect(),
     }

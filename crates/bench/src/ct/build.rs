@@ -157,9 +157,11 @@ pub(super) fn see(
         cancel,
         progress,
     } = *control;
+    let _stage = tracing::info_span!("see").entered();
     let mut remarks = read.remarks;
     let resampled = resample(read.volume, options.max_bytes, threads, cancel)?;
     let is_interpolated = resampled.remark.is_some();
+    tracing::info!(is_interpolated, "volume on a straight grid");
     remarks.extend(resampled.remark);
     let volume = resampled.volume;
     let labels = options.labels.as_ref();

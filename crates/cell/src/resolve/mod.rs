@@ -186,8 +186,20 @@ pub fn resolve_scenario(
     base: &Path,
     overrides: &Overrides,
 ) -> Result<ResolvedScenario, Vec<Finding>> {
+    let _stage = tracing::info_span!("resolve", file).entered();
     let toml = TomlText::parse(file, text).map_err(|finding| vec![finding])?;
-    Draft::read(&toml, base, overrides)?.resolve()
+    let resolved = Draft::read(&toml, base, overrides)?.resolve()?;
+    let (bodies, pairs) = (resolved.cell.bodies.len(), resolved.cell.pairs.len());
+    tracing::info!(
+        goals = resolved.goals.len(),
+        bodies,
+        pairs,
+        "scenario resolved"
+    );
+    for note in &resolved.notes {
+        tracing::debug!("{note}");
+    }
+    Ok(resolved)
 }
 
 /// Resolves a scenario's text but for its goals.

@@ -329,8 +329,8 @@ impl<'de> VariantAccess<'de> for Variant<'de> {
 #[cfg(test)]
 mod tests {
     use super::read_table;
-    use crate::scenario::Scenario;
     use crate::arm::ArmData;
+    use crate::scenario::Scenario;
 
     /// The library's own deserializer, of everything that ships.
     #[test]

@@ -261,9 +261,12 @@ pub fn ensure_with(
         python: install::venv_python(&target),
         folder: Some(target.clone()),
     };
+    let folder = target.display();
     if seal::look(&target, &key) == Found::Complete {
+        tracing::debug!(%folder, python = %python.version, "MuJoCo's environment is there");
         return Ok(environment);
     }
+    tracing::info!(%folder, python = %python.version, "MuJoCo's environment is missing or damaged");
     let failed = |source| unwritable(&cache, source);
     fs::create_dir_all(&cache).map_err(failed)?;
     let guard = Guard::acquire(&cache, GUARD_LIMIT, || {
@@ -275,7 +278,6 @@ pub fn ensure_with(
             seconds: GUARD_LIMIT.as_secs(),
         });
     };
-    let folder = target.display();
     match seal::look(&target, &key) {
         Found::Complete => return Ok(environment),
         Found::Damaged(reason) => progress(&format!(

@@ -233,7 +233,10 @@ fn every_pair_of_shapes_agrees_with_the_reference() {
             parry.misses(),
         );
         // Of the records of the checks, which take the largest.
-        println!("figure shapes_nm {:e}", ours.largest(0).max(ours.largest(1)) * 1e9);
+        println!(
+            "figure shapes_nm {:e}",
+            ours.largest(0).max(ours.largest(1)) * 1e9
+        );
         println!("figure shapes_over_nm {:e}", ours.overestimate() * 1e9);
         assert!(ours.by_sign.iter().all(|errors| errors.len() >= 90));
         assert!(ours.largest(0) <= ERROR_M, "{a}-{b} apart");

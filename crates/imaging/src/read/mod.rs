@@ -132,10 +132,23 @@ pub fn read_volume(
     threads: usize,
     cancel: &AtomicBool,
 ) -> Result<ReadVolume, ImagingError> {
-    match format_of(path)? {
+    let _stage = tracing::debug_span!("read", file = %path.display()).entered();
+    let read = match format_of(path)? {
         Format::Nifti => read_nifti(path, options, cancel),
         Format::Dicom => dicom::read(path, options, threads, cancel),
+    }?;
+    let grid = &read.volume.grid;
+    tracing::info!(
+        format = read.description.format,
+        files = read.description.files,
+        size = ?grid.size(),
+        spacing_mm = ?grid.spacing_m().map(|each| each * 1e3),
+        "volume read"
+    );
+    for remark in &read.remarks {
+        tracing::debug!("{remark:?}");
     }
+    Ok(read)
 }
 
 /// What the system says of a file or a folder.

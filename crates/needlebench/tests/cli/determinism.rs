@@ -3,7 +3,7 @@
 use crate::support::{Bench, SMALL, mujoco_is_ready, small_run, with_edit, without_times};
 
 /// The text of a report without its only part that may differ.
-fn without_timings(bench: &Bench, folder: &str) -> String {
+pub fn without_timings(bench: &Bench, folder: &str) -> String {
     let text = bench.text(&format!("{folder}/small/report.json"));
     let timings = text.find("  \"timings\": {").unwrap();
     let end = timings + text[timings..].find('}').unwrap() + 1;

@@ -32,6 +32,7 @@ mod init;
 mod interrupt;
 mod iso9283;
 mod kinematics;
+mod log;
 mod made;
 mod names_of_metrics;
 mod page;

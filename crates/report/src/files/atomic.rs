@@ -33,7 +33,12 @@ pub(super) fn stream_atomically(
     let mut file = io::BufWriter::new(builder.tempfile_in(folder)?);
     write(&mut file)?;
     let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
-    file.persist(path)?;
+    let written = file.persist(path)?;
+    tracing::debug!(
+        file = %path.display(),
+        bytes = written.metadata().map_or(0, |file| file.len()),
+        "written"
+    );
     Ok(())
 }
 

@@ -70,6 +70,12 @@ pub fn merge(
         results: Some(out.join(RESULTS_FILE)),
     };
     let collected = collect(&manifest, &shards, threads, watch)?;
+    tracing::info!(
+        shards = shards.len(),
+        bytes = collected.bytes,
+        skipped = found.others.len(),
+        "shards of the study"
+    );
     if !out.join(RESULTS_FILE).exists() {
         let table_bytes = space::table_bytes(&manifest, collected.bytes);
         let free_bytes = space::free_bytes(out);

@@ -71,13 +71,15 @@ impl StudyRun<'_> {
                 .then(|| folder.join(RESULTS_FILE)),
         };
         let mut folder = match Folder::open(folder, &self.manifest, self.resume, watch)? {
-            Opened::Complete => return Ok(finished()),
+            Opened::Complete => {
+                tracing::info!(total, "the study is complete");
+                return Ok(finished());
+            }
             Opened::Running(folder) => folder,
         };
-        watch(Progress::Begin {
-            kept: kept(&folder.manifest, &folder.places),
-            total,
-        });
+        let kept = kept(&folder.manifest, &folder.places);
+        tracing::info!(kept, total, threads = self.threads, "cases of the study");
+        watch(Progress::Begin { kept, total });
         let end = self.compute(&mut folder, cancel, watch);
         let lasts = self.manifest.shard.is_some() || !matches!(end, Ok(done) if done == total);
         // A journal that a table will soon replace need not outlast a power failure.
