@@ -180,6 +180,16 @@ class Records(Copy):
         self.put("models/README.md", (self.top / "models/README.md").read_bytes() + b" ")
         self.assertIn("to run changed: models/README.md", self.state())
 
+    def test_a_figure_that_a_document_takes_from_a_record_is_no_input(self) -> None:
+        text = (self.top / "models/README.md").read_bytes()
+        self.put("models/README.md", text + b"<!-- small.worst_nm .1f -->?<!-- -->")
+        self.small("cat models/README.md > /dev/null")
+        self.assertEqual(self.run_checks("small").returncode, 0)
+        self.put("models/README.md", text + b"<!-- small.worst_nm .1f -->2.5<!-- -->")
+        self.assertIn(" holds ", self.state())
+        self.put("models/README.md", text + b"<!-- small.worst_nm .1f -->2.5<!-- --> nm")
+        self.assertIn("to run changed: models/README.md", self.state())
+
     def test_a_record_that_was_edited_is_no_record(self) -> None:
         self.small("echo figure apart 3")
         self.assertEqual(self.run_checks("small").returncode, 0)

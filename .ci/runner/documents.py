@@ -10,10 +10,9 @@ import re
 import sys
 
 from . import records
-from .tree import TOP, MistakeError
+from .tree import FIGURE, TOP, MistakeError
 
 DOCUMENTS = ("README.md", "guide/src/trust.md", "tests/validation/README.md")
-PLACE = re.compile(r"<!-- ([\w-]+)\.(\w+) (\S+) -->(.*?)<!-- -->")
 
 
 def written(value: float, form: str) -> str:
@@ -42,7 +41,7 @@ def update(*, look_only: bool) -> int:
                 stale.append(f"{name}: {check}.{key} is {text} on record, {shown} there")
             return f"<!-- {check}.{key} {form} -->{text}<!-- -->"
 
-        after = PLACE.sub(figure, before)
+        after = FIGURE.sub(figure, before)
         if after != before and not look_only:
             path.write_text(after)
     for each in stale:
