@@ -159,7 +159,9 @@ impl Kinematics {
         }
         let pose = normalised(base_link_from_flange);
         let mut nominal = ClosedForm::BLANK;
-        let base_from_flange = base_from_base_link() * pose;
+        // As its numbers stand: how far off a unit quaternion is tells how far they are rounded, and with that which
+        // branches exist within their rounding.
+        let base_from_flange = base_from_base_link() * base_link_from_flange;
         self.closed_form(&base_from_flange, seed, &mut nominal);
         if !self.is_nominal() {
             return self.calibrated(&pose, &nominal);
@@ -196,7 +198,8 @@ impl Kinematics {
         }
         let pose = normalised(base_link_from_flange);
         let mut nominal = ClosedForm::BLANK;
-        self.closed_form(&(base_from_base_link() * pose), seed, &mut nominal);
+        let as_it_stands = base_from_base_link() * base_link_from_flange;
+        self.closed_form(&as_it_stands, seed, &mut nominal);
         let row = nominal.solution(configuration)?;
         let target = self.numerical.target(&pose);
         Some(self.refined_row(&target, &row))

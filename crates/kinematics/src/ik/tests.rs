@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
 use super::*;
-use crate::{Joints, UrGeometry, pose_from_rotation_vector};
+use crate::{Joints, Pose, UrGeometry, pose_from_rotation_vector};
 
 /// Ten times the worst residual of the closed form over 1e5 random postures, m and rad.
 const RESIDUAL: f64 = 1e-13;
@@ -223,4 +223,49 @@ fn the_jacobian_is_the_derivative_of_the_pose() {
         let difference = super::numerical::pose_error(&forward, &backward) / (2.0 * h);
         assert!((difference - jacobian.column(i)).amax() < 1e-9);
     }
+}
+
+/// A pose as it comes out of a message of single precision.
+#[expect(clippy::cast_possible_truncation, reason = "that is what it is for")]
+fn single_precision(pose: &Pose) -> Pose {
+    let rounded = |value: f64| f64::from(value as f32);
+    Pose::from_parts(
+        pose.translation.vector.map(rounded).into(),
+        nalgebra::Unit::new_unchecked(nalgebra::Quaternion::from(
+            pose.rotation.coords.map(rounded),
+        )),
+    )
+}
+
+#[test]
+fn every_branch_of_the_closed_form_is_a_branch_of_the_arm() {
+    let (arm, mut random) = (ur3(), crate::random::SplitMix64::new(5));
+    let turn = crate::geometry::base_from_base_link();
+    let mut lost = Vec::new();
+    for index in 0..12_000 {
+        let mut q = Joints::from_fn(|_, _| PI * (2.0 * random.open_unit() - 1.0));
+        let is_singular = index % 3 != 0;
+        if is_singular {
+            // Wrist, elbow, or both, as far as numbers have it.
+            if index % 3 == 1 {
+                q[4] = [0.0, PI][index % 2];
+            } else {
+                q[2] = 1e-9 * random.open_unit();
+            }
+        }
+        let exact = arm.base_link_from_flange(&q);
+        for pose in [exact, single_precision(&exact)] {
+            let listed = closed_form(&arm.geometry, &(turn * pose), None);
+            let found = arm.branches(&pose, None).solutions;
+            for row in listed.solutions() {
+                if found
+                    .iter()
+                    .all(|other| other.configuration != row.configuration)
+                {
+                    lost.push((index, row.configuration.label()));
+                }
+            }
+        }
+    }
+    assert!(lost.is_empty(), "{} {lost:?}", lost.len());
 }
