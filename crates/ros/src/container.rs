@@ -1,10 +1,11 @@
 //! MCAP files.
 
 use std::collections::BTreeMap;
-use std::io::{Cursor, Read};
+use std::io::{self, Cursor, Read, Seek, SeekFrom, Take};
 
 use mcap::io::MessageReader;
 use mcap::records::{MessageHeader, Metadata};
+use mcap::sans_io::LinearReaderOptions;
 use mcap::{Compression, WriteOptions, Writer};
 
 use crate::message::Message;
@@ -55,12 +56,215 @@ impl Logged {
 
 /// Why a file cannot be read on.
 #[derive(Debug, thiserror::Error)]
-#[error(transparent)]
-pub struct ReadError(#[from] mcap::McapError);
+pub enum ReadError {
+    /// It does not follow the format, or a checksum does not fit.
+    #[error(transparent)]
+    Mcap(#[from] mcap::McapError),
+    /// It does not hold as many bytes as it says.
+    #[error("the {what} at byte {at} is said to have {stated} bytes, and can have {most} at most")]
+    Length {
+        /// What it is of.
+        what: &'static str,
+        /// Where it begins.
+        at: u64,
+        /// What its head says.
+        stated: u64,
+        /// What the file has, or what that many compressed bytes can hold.
+        most: u64,
+    },
+    /// The file itself.
+    #[error(transparent)]
+    File(#[from] io::Error),
+}
 
-/// Messages of a file in its order, until it breaks off.
-pub fn messages(input: impl Read) -> impl Iterator<Item = Result<Logged, ReadError>> {
-    MessageReader::new(input).map(|each| Ok(Logged(each?)))
+/// Messages of a file in its order, until it breaks off. No more is held in memory than the file's largest record or
+/// what its largest chunk unpacks to, 1 GiB at most.
+///
+/// # Errors
+/// What cannot be read or sought in `input`.
+pub fn messages(
+    mut input: impl Read + Seek,
+) -> io::Result<impl Iterator<Item = Result<Logged, ReadError>>> {
+    let good = Lengths::of(&mut input)?;
+    input.seek(SeekFrom::Start(0))?;
+    let most = good.largest.try_into().unwrap_or(usize::MAX);
+    // A record's own head comes on top.
+    let options = LinearReaderOptions::default().with_record_length_limit(most);
+    Ok(Messages {
+        reader: MessageReader::new_with_options(input.take(good.until), options),
+        broken: good.broken,
+    })
+}
+
+struct Messages<R> {
+    reader: MessageReader<Take<R>>,
+    broken: Option<ReadError>,
+}
+
+impl<R: Read> Iterator for Messages<R> {
+    type Item = Result<Logged, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match (self.reader.next()?, self.broken.take()) {
+            (Ok(message), broken) => {
+                self.broken = broken;
+                Some(Ok(Logged(message)))
+            }
+            // Where it ends for the reader is where it was cut.
+            (Err(mcap::McapError::UnexpectedEof), Some(broken)) => Some(Err(broken)),
+            (Err(error), _) => Some(Err(error.into())),
+        }
+    }
+}
+
+/// Bytes that a chunk may unpack to: a thousand times what writers put into one.
+pub const MOST_UNPACKED: u64 = 1 << 30;
+
+/// What a byte can unpack to: a block of zstd is 128 KiB at most, and four bytes at least.
+const MOST_PER_BYTE: u64 = 1 << 15;
+
+/// First byte of a chunk's record.
+const CHUNK: u8 = 0x06;
+
+/// First byte of the last record.
+const FOOTER: u8 = 0x02;
+
+/// A record's first byte and its length.
+const HEAD: u64 = 9;
+
+/// How far the lengths that stand in a file fit it: the format's reader makes room for whatever it is told.
+struct Lengths {
+    /// All records before this byte are whole.
+    until: u64,
+    /// Bytes of the largest record, or of what the largest chunk unpacks to.
+    largest: u64,
+    /// What is wrong there.
+    broken: Option<ReadError>,
+}
+
+impl Lengths {
+    /// Of a file; <https://mcap.dev/spec> has the layout.
+    fn of(input: &mut (impl Read + Seek)) -> io::Result<Self> {
+        let end = input.seek(SeekFrom::End(0))?;
+        let mut found = Self {
+            until: end,
+            largest: 0,
+            broken: None,
+        };
+        // The magic bytes, which the reader looks at.
+        let mut at: u64 = 8;
+        while at.saturating_add(HEAD) <= end {
+            input.seek(SeekFrom::Start(at))?;
+            let (kind, stated) = record(input)?;
+            let there = stated.min(end - at - HEAD);
+            found.largest = found.largest.max(there);
+            if kind == CHUNK && !found.chunk(input, at, stated, there)? {
+                break;
+            }
+            if stated > there {
+                // Of a chunk, what is there is read.
+                let until = if kind == CHUNK { end } else { at };
+                found.breaks_off(until, at, "record", stated, there);
+                break;
+            }
+            at += HEAD + stated;
+            if kind == FOOTER {
+                break;
+            }
+        }
+        Ok(found)
+    }
+
+    fn breaks_off(&mut self, until: u64, at: u64, what: &'static str, stated: u64, most: u64) {
+        self.until = until;
+        self.broken = Some(ReadError::Length {
+            what,
+            at,
+            stated,
+            most,
+        });
+    }
+
+    /// Looks into a chunk, and at its records where they are not compressed; false where they do not fit it. Of its
+    /// `length` `there` bytes are in the file.
+    fn chunk(
+        &mut self,
+        input: &mut (impl Read + Seek),
+        at: u64,
+        length: u64,
+        there: u64,
+    ) -> io::Result<bool> {
+        // Two times, size, checksum, name of the compression, compressed size.
+        const LEAST: u64 = 40;
+        if there < LEAST {
+            self.breaks_off(at, at, "chunk", LEAST, there);
+            return Ok(false);
+        }
+        let mut head = [0; 32];
+        input.read_exact(&mut head)?;
+        let unpacked = u64::from_le_bytes(head[16..24].try_into().expect("eight bytes"));
+        let name = u32::from_le_bytes(head[28..].try_into().expect("four bytes"));
+        let name = u64::from(name);
+        if name > there - LEAST {
+            self.breaks_off(at, at, "compression's name", name, there - LEAST);
+            return Ok(false);
+        }
+        input.seek(SeekFrom::Start(at + HEAD + 32 + name))?;
+        let mut size = [0; 8];
+        input.read_exact(&mut size)?;
+        let packed = u64::from_le_bytes(size);
+        if packed > length - LEAST - name {
+            self.breaks_off(
+                at,
+                at,
+                "content of the chunk",
+                packed,
+                length - LEAST - name,
+            );
+            return Ok(false);
+        }
+        let compressed = name > 0;
+        let packed_there = packed.min(there - LEAST - name);
+        let can_be = |bytes: u64| {
+            if compressed {
+                bytes.saturating_mul(MOST_PER_BYTE).min(MOST_UNPACKED)
+            } else {
+                bytes
+            }
+        };
+        if unpacked > can_be(packed) {
+            self.breaks_off(at, at, "unpacked chunk", unpacked, can_be(packed));
+            return Ok(false);
+        }
+        self.largest = self.largest.max(unpacked.min(can_be(packed_there)));
+        if compressed {
+            return Ok(true);
+        }
+        let mut inner = at + HEAD + LEAST + name;
+        let (end, end_there) = (inner + packed, inner + packed_there);
+        while inner + HEAD <= end_there {
+            input.seek(SeekFrom::Start(inner))?;
+            let (_, stated) = record(input)?;
+            if stated > end - inner - HEAD {
+                self.breaks_off(inner, inner, "record", stated, end - inner - HEAD);
+                return Ok(false);
+            }
+            inner += HEAD + stated;
+        }
+        if inner < end && end == end_there {
+            self.breaks_off(inner, inner, "record", HEAD, end - inner);
+            return Ok(false);
+        }
+        Ok(true)
+    }
+}
+
+/// A record's kind and length.
+fn record(input: &mut impl Read) -> io::Result<(u8, u64)> {
+    let mut head = [0; 9];
+    input.read_exact(&mut head)?;
+    let [kind, length @ ..] = head;
+    Ok((kind, u64::from_le_bytes(length)))
 }
 
 /// Why a file cannot be made.

@@ -107,18 +107,22 @@ pub enum NotAMessage {
     /// JSON that is none, or of something else.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
+    /// Bytes of another kind: `ros1`, `protobuf`.
+    #[error("it is encoded as `{0}`")]
+    Encoding(String),
 }
 
 impl JointState {
-    /// Of the bytes of a message in an encoding: `json`, or else CDR.
+    /// Of the bytes of a message in an encoding: `json` or `cdr`.
     ///
     /// # Errors
     /// [`NotAMessage`].
     pub fn decode(encoding: &str, data: &[u8]) -> Result<Self, NotAMessage> {
-        if encoding == "json" {
-            return Ok(serde_json::from_slice(data)?);
+        match encoding {
+            "json" => Ok(serde_json::from_slice(data)?),
+            "cdr" => cdr::decode(data).ok_or(NotAMessage::CutOff),
+            other => Err(NotAMessage::Encoding(other.to_owned())),
         }
-        cdr::decode(data).ok_or(NotAMessage::CutOff)
     }
 }
 
