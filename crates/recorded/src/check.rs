@@ -151,14 +151,9 @@ pub(crate) fn checked(
         let inertia = take(Quantity::PayloadInertia);
         loads(mass, centre, inertia.as_deref(), &keep)
     };
-    let kind = kind(&actual_q, target.as_deref(), raw.draws_current);
-    if kind == LogKind::Simulator {
-        notes.push(
-            "this is a simulator's log: the measured angles are the set-points, bit for bit; it \
-             shows the controller's model and nothing of an arm"
-                .to_owned(),
-        );
-    }
+    let currents = [target_current_a.as_deref(), actual_current_a.as_deref()];
+    let (kind, signs) = SimulatorSigns::of(&raw, &actual_q, target.as_deref(), currents).judge();
+    notes.extend(signs);
     if target.is_none() {
         notes.push(
             "the log has no target_q: an arm can be calibrated from it, but there is nothing to \
@@ -424,21 +419,88 @@ fn loads(
     loads
 }
 
-/// A simulator follows its set-points exactly, also while they move.
-fn kind(actual: &[Joints], target: Option<&[JointState]>, draws_current: Option<bool>) -> LogKind {
-    let Some(target) = target else {
-        return LogKind::Arm;
-    };
-    let moves = target
-        .iter()
-        .any(|state| state.velocity.amax() > MOVING_RAD_S);
-    let same = actual
-        .iter()
-        .zip(target)
-        .all(|(q, state)| *q == state.position);
-    if same && moves && draws_current != Some(true) {
-        LogKind::Simulator
-    } else {
-        LogKind::Arm
+/// What of a log no real arm does while it moves; the first of them, by itself, makes it a simulator's.
+struct SimulatorSigns {
+    /// Encoders have noise, and a servo an error.
+    angles_are_set_points: bool,
+    /// The others, in words.
+    others: Vec<String>,
+}
+
+impl SimulatorSigns {
+    fn of(
+        raw: &RawLog,
+        actual: &[Joints],
+        target: Option<&[JointState]>,
+        currents: [Option<&[Joints]>; 2],
+    ) -> Self {
+        let moves = match target {
+            Some(target) => target
+                .iter()
+                .any(|state| state.velocity.amax() > MOVING_RAD_S),
+            None => actual.windows(2).any(|pair| pair[0] != pair[1]),
+        };
+        let mut signs = Self {
+            angles_are_set_points: false,
+            others: Vec::new(),
+        };
+        if !moves {
+            return signs;
+        }
+        signs.angles_are_set_points = target.is_some_and(|target| {
+            actual
+                .iter()
+                .zip(target)
+                .all(|(q, state)| *q == state.position)
+        });
+        if let [Some(asked), Some(measured)] = currents
+            && asked == measured
+        {
+            signs
+                .others
+                .push("the measured currents are the asked ones, bit for bit".to_owned());
+        }
+        let constant = |range: Option<[f64; 2]>| {
+            range
+                .filter(|[low, high]| low == high)
+                .map(|[value, _]| value)
+        };
+        if let Some(current_a) = constant(raw.robot_current_a) {
+            signs
+                .others
+                .push(format!("the robot draws {current_a} A in every row"));
+        }
+        if let Some([_, 0.0]) = raw.main_voltage_v {
+            signs.others.push("the mains have 0 V".to_owned());
+        }
+        if let Some(degrees) = constant(raw.temperature_c) {
+            signs
+                .others
+                .push(format!("all joints have {degrees} degrees C in every row"));
+        }
+        signs
+    }
+
+    /// Whether it is a simulator's, and what says so.
+    fn judge(self) -> (LogKind, Option<String>) {
+        /// One alone may be a log's own: a column that was filled in.
+        const ENOUGH: usize = 2;
+        let Self {
+            angles_are_set_points,
+            mut others,
+        } = self;
+        if angles_are_set_points {
+            others.insert(
+                0,
+                "the measured angles are the set-points, bit for bit".to_owned(),
+            );
+        } else if others.len() < ENOUGH {
+            return (LogKind::Arm, None);
+        }
+        let note = format!(
+            "this is a simulator's log: {}; it shows the controller's model and nothing of an arm",
+            others.join(", ")
+        );
+        (LogKind::Simulator, Some(note))
     }
 }

@@ -106,15 +106,37 @@ impl<R: Read> Lines<R> {
     /// The next line in `buffer`, and whether it has an end; `None` after the last one.
     fn next(&mut self) -> std::io::Result<Option<bool>> {
         self.buffer.clear();
-        let count = Read::by_ref(&mut self.input)
-            .take(LONGEST_LINE)
-            .read_until(b'\n', &mut self.buffer)?;
-        if count == 0 {
+        let mut limited = Read::by_ref(&mut self.input).take(LONGEST_LINE);
+        // Ends of lines are LF, CR LF, or CR alone.
+        loop {
+            let there = limited.fill_buf()?;
+            let Some(end) = there.iter().position(|byte| matches!(byte, b'\n' | b'\r')) else {
+                let count = there.len();
+                if count == 0 {
+                    break;
+                }
+                self.buffer.extend_from_slice(there);
+                limited.consume(count);
+                continue;
+            };
+            self.buffer.extend_from_slice(&there[..=end]);
+            let mut last = there[end];
+            limited.consume(end + 1);
+            while last == b'\r'
+                && let Some(&next @ (b'\r' | b'\n')) = limited.fill_buf()?.first()
+            {
+                self.buffer.push(next);
+                limited.consume(1);
+                last = next;
+            }
+            break;
+        }
+        if self.buffer.is_empty() {
             return Ok(None);
         }
         self.digest.update(&self.buffer);
         self.number += 1;
-        Ok(Some(self.buffer.last() == Some(&b'\n')))
+        Ok(Some(matches!(self.buffer.last(), Some(b'\n' | b'\r'))))
     }
 
     /// The line as text, without its end.

@@ -39,6 +39,9 @@ use fit::{Data, Fit, Model};
 /// off (1 deg/s).
 pub(crate) const MOVING_RAD_S: f64 = 0.05;
 
+/// No UR arm carries more, kg: an estimate beyond is of a run that does not show the load.
+const HEAVIEST_KG: f64 = 100.0;
+
 /// Loads that are told apart; rows of further ones do not count.
 const MOST_LOADS: usize = 8;
 
@@ -254,7 +257,7 @@ fn controller(context: &Context<'_>, torque_nm: &[Joints], known: &KnownArm<'_>)
                 .within(coarsest::ROTOR.0, coarsest::ROTOR.1)
                 .not_negative()
         }),
-        loads: loads(context.loads, best, &without),
+        loads: loads(context, best, &without),
         gravity_m_s2: estimate(&|fit| fit.gravity())
             .within(coarsest::GRAVITY.0, coarsest::GRAVITY.1),
         has_tensors,
@@ -358,7 +361,7 @@ fn measured(
                 .within(coarsest::VISCOUS.0, coarsest::VISCOUS.1)
                 .not_negative()
         }),
-        loads: loads(context.loads, best, &without),
+        loads: loads(context, best, &without),
         gravity_m_s2,
         has_tensors,
         rms_nm: best.rms_nm(&data),
@@ -366,19 +369,34 @@ fn measured(
     })
 }
 
-fn loads(logged: &[Option<Load>], fit: &Fit, without: &[Fit]) -> Vec<IdentifiedLoad> {
-    let each = logged.iter().enumerate();
-    each.map(|(at, logged)| IdentifiedLoad {
-        logged: *logged,
-        mass_kg: estimate(fit, without, &|fit| fit.mass(at))
-            .within(coarsest::MASS.0, coarsest::MASS.1)
-            .not_negative(),
-        centre_m: from_fn(|axis| {
-            estimate(fit, without, &|fit| fit.centre(at, axis))
-                .within(coarsest::CENTRE.0, coarsest::CENTRE.1)
-        }),
+fn loads(context: &Context<'_>, fit: &Fit, without: &[Fit]) -> Vec<IdentifiedLoad> {
+    let each = context.loads.iter().enumerate();
+    each.map(|(at, logged)| {
+        let shown = is_turned(context, at);
+        let of_load = |of: &dyn Fn(&Fit) -> Option<f64>| {
+            estimate(fit, without, &|fit| of(fit).filter(|_| shown))
+        };
+        IdentifiedLoad {
+            logged: *logged,
+            mass_kg: of_load(&|fit| fit.mass(at).filter(|mass_kg| *mass_kg < HEAVIEST_KG))
+                .within(coarsest::MASS.0, coarsest::MASS.1)
+                .not_negative(),
+            centre_m: from_fn(|axis| {
+                of_load(&|fit| fit.centre(at, axis)).within(coarsest::CENTRE.0, coarsest::CENTRE.1)
+            }),
+        }
     })
     .collect()
+}
+
+/// Whether the rows of a load are of more than one posture: the gravity torques of one hold three numbers of a load,
+/// its weight and where that acts across the plumb line, and it has four.
+fn is_turned(context: &Context<'_>, load: usize) -> bool {
+    const TURNED_RAD: f64 = 0.02;
+    let rows = (0..context.run.len()).filter(|row| (context.load_of)(*row) == Some(load));
+    let mut postures = rows.map(|row| context.states[row].position);
+    let first = postures.next();
+    first.is_some_and(|first| postures.any(|other| (other - first).amax() > TURNED_RAD))
 }
 
 /// Block of each row.

@@ -1,16 +1,20 @@
 //! Logs of ROS: `sensor_msgs/JointState` in an MCAP file, as CDR or JSON.
 
 use std::collections::BTreeMap;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use needlebench_cell::{Finding, open_input};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_NAMES};
-use needlebench_ros::{JointState, messages};
+use needlebench_ros::{JointState, NotAMessage, messages};
 use sha2::{Digest, Sha256};
 
 use crate::raw::RawLog;
 use crate::{EffortMeaning, Quantity, ReadOptions};
+
+const STILL_THERE: &str = "is it still there?";
+
+const CUT_OFF: &str = "the file may be cut off: `mcap recover` mends what can be mended";
 
 /// Whether a file is one of MCAP, by its first bytes.
 pub(crate) fn is_mcap(path: &Path) -> bool {
@@ -27,7 +31,7 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
             refuse(format!("cannot read the log: {error}"), hint)
         })
     };
-    let hash = hash_of(open()?).map_err(|error| refuse(error.to_string(), "is it still there?"))?;
+    let hash = hash_of(open()?).map_err(|error| refuse(error.to_string(), STILL_THERE))?;
     let (topic, others) = choose_topic(&file, BufReader::new(open()?), options.topic.as_deref())?;
     let mut raw = RawLog::default();
     raw.notes.extend(others);
@@ -39,7 +43,9 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
     ];
     raw.expect(quantities, 0);
     let (mut broken, mut without_stamp, mut others) = (None, 0, 0);
-    for message in messages(BufReader::with_capacity(1 << 20, open()?)) {
+    let mut prefix: Option<String> = None;
+    let whole = messages(BufReader::with_capacity(1 << 20, open()?));
+    for message in whole.map_err(|error| refuse(error.to_string(), STILL_THERE))? {
         let message = match message {
             Ok(message) => message,
             Err(error) => {
@@ -55,9 +61,15 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
         let parsed = JointState::decode(message.encoding(), message.data());
         let state = parsed.map_err(|error| {
             let message = format!("message {number} of {topic} is no joint state: {error}");
-            refuse(message, "joint states are read as CDR and as JSON")
+            let hint = match error {
+                NotAMessage::Encoding(encoding) if encoding == "ros1" => {
+                    "messages of ROS 1 are not read: `rosbags-convert` makes a log of ROS 2 of a bag"
+                }
+                _ => "joint states are read as CDR and as JSON",
+            };
+            refuse(message, hint)
         })?;
-        let Some(places) = places(&state.name).map_err(|name| {
+        let Some((places, of)) = places(&state.name).map_err(|name| {
             let message = format!("message {number} of {topic} has two joints `{name}`");
             refuse(
                 message,
@@ -68,6 +80,10 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
             others += 1;
             continue;
         };
+        let first = prefix.get_or_insert_with(|| of.to_owned());
+        if first != of {
+            return Err(two_arms(&file, &topic, first, of));
+        }
         let stamp_s = state.header.stamp.seconds();
         let logged_s = message.log_time_ns() as f64 * 1e-9;
         let time_s = stamp_s.unwrap_or(logged_s);
@@ -83,8 +99,7 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
     }
     if let Some(error) = broken {
         if raw.rows() == 0 {
-            let hint = "the file may be cut off: `mcap recover` mends what can be mended";
-            return Err(refuse(format!("cannot read the log: {error}"), hint));
+            return Err(refuse(format!("cannot read the log: {error}"), CUT_OFF));
         }
         raw.notes.push(format!(
             "the file breaks off after {} messages of {topic} ({error})",
@@ -170,20 +185,35 @@ const ROS_TOPIC: &str = "/joint_states";
 /// chose.
 fn choose_topic(
     file: &str,
-    input: impl Read,
+    input: impl Read + Seek,
     wanted: Option<&str>,
 ) -> Result<(String, Option<String>), Vec<Finding>> {
+    let refuse = |message: String, hint: String| Err(vec![Finding::new(file, message).hint(hint)]);
     let mut topics: BTreeMap<String, usize> = BTreeMap::new();
-    for message in messages(input) {
-        let Ok(message) = message else { break };
+    let all = match messages(input) {
+        Ok(all) => all,
+        Err(error) => return refuse(error.to_string(), STILL_THERE.to_owned()),
+    };
+    let mut broken = None;
+    for message in all {
+        let message = match message {
+            Ok(message) => message,
+            Err(error) => {
+                broken = Some(error);
+                break;
+            }
+        };
         let kind = message.message_type();
         if kind.is_some_and(|kind| kind.ends_with("JointState")) {
             *topics.entry(message.topic().to_owned()).or_default() += 1;
         }
     }
     let names: Vec<&str> = topics.keys().map(String::as_str).collect();
-    let refuse = |message: String, hint: String| Err(vec![Finding::new(file, message).hint(hint)]);
     match (wanted, names.as_slice()) {
+        (_, []) if broken.is_some() => {
+            let error = broken.as_ref().map(ToString::to_string).unwrap_or_default();
+            refuse(format!("cannot read the log: {error}"), CUT_OFF.to_owned())
+        }
         (_, []) => refuse(
             "the log has no joint states".to_owned(),
             "messages of sensor_msgs/JointState are read: record /joint_states".to_owned(),
@@ -208,11 +238,20 @@ fn choose_topic(
     }
 }
 
-/// Places of the six joints among names, which may have a prefix; none if one is missing.
+/// Several arms on one topic: their states would be taken for one that jumps.
+fn two_arms(file: &str, topic: &str, first: &str, other: &str) -> Vec<Finding> {
+    let joint = JOINT_NAMES[0];
+    let message = format!(
+        "joint states of two arms are on {topic}: of `{first}{joint}` and of `{other}{joint}`"
+    );
+    vec![Finding::new(file, message).hint("record one arm a topic: a log is of one arm")]
+}
+
+/// Places of the six joints among names, and the prefix that they have in common; none if one is missing.
 ///
 /// # Errors
 /// A joint that is there twice.
-fn places(names: &[String]) -> Result<Option<[usize; JOINT_COUNT]>, &'static str> {
+fn places(names: &[String]) -> Result<Option<([usize; JOINT_COUNT], &str)>, &'static str> {
     let mut found = [None; JOINT_COUNT];
     for (at, name) in names.iter().enumerate() {
         let joint = JOINT_NAMES.iter().position(|joint| name.ends_with(joint));
@@ -229,5 +268,7 @@ fn places(names: &[String]) -> Result<Option<[usize; JOINT_COUNT]>, &'static str
         };
         *place = found;
     }
-    Ok(Some(whole))
+    let first = &names[whole[0]];
+    let prefix = first.strip_suffix(JOINT_NAMES[0]).unwrap_or_default();
+    Ok(Some((whole, prefix)))
 }

@@ -43,6 +43,8 @@ pub enum Quantity {
     Temperature,
     /// Current of the whole robot.
     RobotCurrent,
+    /// Voltage of the mains.
+    MainVoltage,
 }
 
 /// What the numbers of a quantity are.
@@ -60,12 +62,12 @@ enum Numbers {
 
 /// All quantities in their order: name in UR's real-time data exchange (of what that has not, the word of a table of
 /// columns), number of columns, and what their numbers are.
-const HEADINGS: [(Quantity, &str, usize, Numbers); 20] = {
+const HEADINGS: [(Quantity, &str, usize, Numbers); 21] = {
     use Numbers::{Angles, Measured, OfTheRow, Times};
     use Quantity::{
-        ActualCurrent, ActualQ, ActualQd, ActualTcp, ActualTorque, JointMode, Payload, PayloadCog,
-        PayloadInertia, RobotCurrent, RobotMode, RobotStatusBits, SafetyMode, TargetCurrent,
-        TargetMoment, TargetQ, TargetQd, TargetQdd, Temperature, Time,
+        ActualCurrent, ActualQ, ActualQd, ActualTcp, ActualTorque, JointMode, MainVoltage, Payload,
+        PayloadCog, PayloadInertia, RobotCurrent, RobotMode, RobotStatusBits, SafetyMode,
+        TargetCurrent, TargetMoment, TargetQ, TargetQd, TargetQdd, Temperature, Time,
     };
     [
         (Time, "timestamp", 1, Times),
@@ -88,6 +90,7 @@ const HEADINGS: [(Quantity, &str, usize, Numbers); 20] = {
         (RobotStatusBits, "robot_status_bits", 1, OfTheRow),
         (Temperature, "joint_temperatures", 6, OfTheRow),
         (RobotCurrent, "actual_robot_current", 1, OfTheRow),
+        (MainVoltage, "actual_main_voltage", 1, OfTheRow),
     ]
 };
 

@@ -54,12 +54,22 @@ pub(crate) struct RawLog {
     pub line: Vec<u32>,
     /// Lowest and highest temperature of any joint, degrees C.
     pub temperature_c: Option<[f64; 2]>,
-    /// Whether the robot drew any current; unknown where the log does not say.
-    pub draws_current: Option<bool>,
+    /// Lowest and highest current of the whole robot, A; none where the log does not say.
+    pub robot_current_a: Option<[f64; 2]>,
+    /// Lowest and highest voltage of the mains, V.
+    pub main_voltage_v: Option<[f64; 2]>,
     /// What was found.
     pub notes: Vec<String>,
     /// Rows in the file.
     pub rows_in_file: usize,
+}
+
+/// Widens a range to hold numbers that are finite.
+fn widen(range: &mut Option<[f64; 2]>, numbers: &[f64]) {
+    for number in numbers.iter().filter(|number| number.is_finite()) {
+        let range = range.get_or_insert([*number; 2]);
+        *range = [range[0].min(*number), range[1].max(*number)];
+    }
 }
 
 impl RawLog {
@@ -104,15 +114,10 @@ impl RawLog {
                 because(Cut::Freedrive);
             }
             Quantity::Temperature => {
-                for degrees in numbers.iter().filter(|degrees| degrees.is_finite()) {
-                    let range = self.temperature_c.get_or_insert([*degrees; 2]);
-                    *range = [range[0].min(*degrees), range[1].max(*degrees)];
-                }
+                widen(&mut self.temperature_c, numbers);
             }
-            Quantity::RobotCurrent => {
-                let draws = self.draws_current.get_or_insert(false);
-                *draws |= first.is_finite() && first != 0.0;
-            }
+            Quantity::RobotCurrent => widen(&mut self.robot_current_a, numbers),
+            Quantity::MainVoltage => widen(&mut self.main_voltage_v, numbers),
             _ => {
                 if let Some(values) = self.values.get_mut(&quantity) {
                     values.extend_from_slice(numbers);

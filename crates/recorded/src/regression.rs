@@ -118,6 +118,15 @@ pub(crate) struct Solution {
     pub determined: Vec<bool>,
 }
 
+impl Solution {
+    /// As many unknowns as rows fit any rows: they determine nothing.
+    pub(crate) fn determined_by(&mut self, rows: f64) {
+        if rows <= self.values.len() as f64 {
+            self.determined.fill(false);
+        }
+    }
+}
+
 /// Solves `N p = r` for a symmetric positive semi-definite `N`, in the directions that it determines.
 pub(crate) fn solve(normal: &DMatrix<f64>, right: &DVector<f64>) -> Solution {
     let count = right.len();

@@ -121,10 +121,12 @@ impl Data {
     }
 
     fn fit(&self, joint: usize, wanted: impl Fn(usize) -> bool) -> Solution {
-        let (sums, _) = self.total(joint, wanted);
+        let (sums, rows) = self.total(joint, wanted);
         let normal = DMatrix::from_fn(TERMS - 1, TERMS - 1, |i, j| sums[i + 1][j + 1]);
         let right = DVector::from_fn(TERMS - 1, |i, _| sums[0][i + 1]);
-        solve(&normal, &right)
+        let mut found = solve(&normal, &right);
+        found.determined_by(rows);
+        found
     }
 
     /// Sum of squares that a fit leaves, and rows.

@@ -250,7 +250,8 @@ impl Fit {
                 self.find_gravity(grams);
             }
             let normal = self.normal(grams, self.gravity_m_s2);
-            let solution = solve(&normal.matrix, &normal.right);
+            let mut solution = solve(&normal.matrix, &normal.right);
+            solution.determined_by(grams.iter().flatten().map(|gram| gram.rows).sum());
             (self.values, self.determined) = (solution.values, solution.determined);
             for load in 0..self.inertia.len() {
                 let mass_kg = self.values[LOADS + 4 * load];

@@ -240,9 +240,40 @@ fn a_simulators_log_is_told() {
             row[to] = row[from].clone();
         }
     }
-    sheet.change(&["actual_robot_current"], |_| 0.0);
-    let run = read_text(&sheet.text(), &ReadOptions::default()).unwrap();
-    assert_eq!(run.kind, LogKind::Simulator);
+    // Whatever it says that it draws.
+    for current_a in [0.0, 10.6] {
+        sheet.change(&["actual_robot_current"], |_| current_a);
+        let run = read_text(&sheet.text(), &ReadOptions::default()).unwrap();
+        assert_eq!(run.kind, LogKind::Simulator);
+        let told = |note: &String| {
+            note.contains("are the set-points, bit for bit")
+                && note.contains(&format!("{current_a} A in every row"))
+        };
+        assert!(run.notes.iter().any(told), "{:?}", run.notes);
+    }
+}
+
+#[test]
+fn a_simulator_with_noisy_encoders_is_told_by_its_power() {
+    let mut sheet = sheet();
+    sheet.change(&["actual_robot_current"], |_| 10.6);
+    let kind = |sheet: &Sheet| {
+        read_text(&sheet.text(), &ReadOptions::default())
+            .unwrap()
+            .kind
+    };
+    // One sign alone may be a column that was filled in.
+    assert_eq!(kind(&sheet), LogKind::Arm);
+    for joint in 0..6 {
+        let (from, to) = (
+            sheet.column(&format!("target_current_{joint}")),
+            sheet.column(&format!("actual_current_{joint}")),
+        );
+        for row in &mut sheet.rows {
+            row[to] = row[from].clone();
+        }
+    }
+    assert_eq!(kind(&sheet), LogKind::Simulator);
 }
 
 #[test]

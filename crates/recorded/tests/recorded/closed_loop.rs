@@ -261,3 +261,55 @@ fn a_joint_that_stands_is_not_identified() {
         assert_eq!(figure.known(), None, "{figure:?}");
     }
 }
+
+/// One posture has three numbers of a load, and a load has four.
+#[test]
+fn an_arm_at_rest_shows_no_load() {
+    let robot = robot("ur3e");
+    let mut run = read_text(&log(&robot, 0.0), &ReadOptions::default()).unwrap();
+    let posture = run.actual_q[0];
+    let held_nm = run.target_moment_nm.as_ref().unwrap()[0];
+    run.target_moment_nm.as_mut().unwrap().fill(held_nm);
+    run.actual_q.fill(posture);
+    let target = run.target.as_mut().unwrap();
+    for state in target {
+        state.position = posture;
+        state.velocity.fill(0.0);
+        state.acceleration.fill(0.0);
+    }
+    let known = KnownArm {
+        robot: &robot,
+        rotor_inertia_kgm2: None,
+        torque_constant_nm_a: Some(CONSTANTS),
+        gravity_m_s2: GRAVITY,
+    };
+    let load = identify(&run, &known).controller.unwrap().loads[0];
+    assert_eq!(load.mass_kg.value, None, "{load:?}");
+    for centre in load.centre_m {
+        assert_eq!(centre.value, None, "{load:?}");
+    }
+}
+
+/// As many rows as unknowns are fitted whatever they hold.
+#[test]
+fn a_few_rows_determine_no_torque_constant() {
+    let robot = robot("ur3e");
+    let run = read_text(&log(&robot, 0.0), &ReadOptions::default()).unwrap();
+    let mut few = run.clone();
+    for (row, state) in few.target.as_mut().unwrap().iter_mut().enumerate() {
+        // All rows but three of joint 1 are too slow to count, and not at rest.
+        if ![10, 200, 400].contains(&row) {
+            state.velocity[1] = 1e-3;
+        }
+    }
+    let known = KnownArm {
+        robot: &robot,
+        rotor_inertia_kgm2: None,
+        torque_constant_nm_a: None,
+        gravity_m_s2: GRAVITY,
+    };
+    let constant = identify(&few, &known).current.unwrap().joints[1].torque_constant_nm_a;
+    assert_eq!(constant.known(), None, "{constant:?}");
+    let constant = identify(&run, &known).current.unwrap().joints[1].torque_constant_nm_a;
+    assert!(constant.known().is_some());
+}

@@ -158,3 +158,117 @@ fn a_file_that_breaks_off_is_refused_or_read_as_far_as_it_goes() {
         }
     }
 }
+
+/// Messages of two arms by turns on one topic, in records of the file or in chunks.
+fn messages(encoding: &str, prefixes: [&str; 2], options: mcap::WriteOptions) -> Vec<u8> {
+    let mut writer = options.create(std::io::Cursor::new(Vec::new())).unwrap();
+    let schema = writer
+        .add_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
+        .unwrap();
+    let channel = writer
+        .add_channel(schema, "/joint_states", encoding, &BTreeMap::new())
+        .unwrap();
+    for k in 0..100 {
+        let header = MessageHeader {
+            channel_id: channel,
+            sequence: k,
+            log_time: u64::from(k) * 2_000_000 + 7,
+            publish_time: 0,
+        };
+        let prefix = prefixes[k as usize % 2];
+        let data = cdr(
+            100.0 + 0.002 * f64::from(k),
+            &positions(k),
+            &[0.0; 6],
+            prefix,
+        );
+        writer.write_to_known_channel(&header, &data).unwrap();
+    }
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
+}
+
+fn read_bytes(bytes: &[u8]) -> Result<RecordedRun, Vec<Finding>> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("log.mcap"), bytes).unwrap();
+    read(&folder, &ReadOptions::default())
+}
+
+fn uncompressed() -> mcap::WriteOptions {
+    mcap::WriteOptions::new().compression(None)
+}
+
+#[test]
+fn two_arms_on_one_topic_are_no_arm_that_jumps() {
+    let both = messages("cdr", ["left_", "right_"], uncompressed());
+    let findings = read_bytes(&both).unwrap_err();
+    let text = &findings[0].message;
+    assert!(
+        text.contains("`left_shoulder_pan_joint`") && text.contains("`right_shoulder_pan_joint`"),
+        "{text}"
+    );
+}
+
+#[test]
+fn messages_of_ros_1_are_named() {
+    let findings = read_bytes(&messages("ros1", [""; 2], uncompressed())).unwrap_err();
+    assert!(
+        findings[0].message.contains("encoded as `ros1`"),
+        "{findings:?}"
+    );
+    assert!(findings[0].hint.as_deref().unwrap().contains("ROS 1"));
+}
+
+/// Where records of a kind begin, of the file and not of its chunks.
+fn records(bytes: &[u8], kind: u8) -> Vec<usize> {
+    let (mut at, mut found) = (8, Vec::new());
+    while at + 9 < bytes.len() {
+        if bytes[at] == kind {
+            found.push(at);
+        }
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+        at += 9 + usize::try_from(length).unwrap();
+    }
+    found
+}
+
+#[test]
+fn lengths_that_lie_are_refused_before_there_is_room_for_them() {
+    let plain = messages("cdr", [""; 2], uncompressed());
+    let packed = messages("cdr", [""; 2], mcap::WriteOptions::new());
+    let loose = messages("cdr", [""; 2], mcap::WriteOptions::new().use_chunks(false));
+    for good in [&plain, &packed, &loose] {
+        assert_eq!(read_bytes(good).unwrap().len(), 100);
+    }
+    let with = |bytes: &[u8], at: usize, length: u64| {
+        let mut bytes = bytes.to_vec();
+        bytes[at..at + 8].copy_from_slice(&length.to_le_bytes());
+        bytes
+    };
+    let chunk = records(&plain, 6)[0];
+    let first_inside = chunk + 9 + 40;
+    for length in [1 << 20, 3 << 30, 1 << 62, u64::MAX] {
+        let schema = records(&loose, 3)[0];
+        let packed_chunk = records(&packed, 6)[0];
+        let liars = [
+            // A record of the file; one within a chunk; a chunk's unpacked and packed sizes.
+            with(&loose, schema + 1, length),
+            with(&plain, first_inside + 1, length),
+            with(&plain, chunk + 9 + 16, length),
+            with(&plain, chunk + 9 + 32, length),
+            with(&packed, packed_chunk + 9 + 36, length),
+        ];
+        for (index, bytes) in liars.iter().enumerate() {
+            let findings = read_bytes(bytes).unwrap_err();
+            let text = &findings[0].message;
+            assert!(
+                text.contains("is said to have"),
+                "{index}, {length}: {text}"
+            );
+        }
+        // What stands before is read, and said to be all.
+        let message = records(&loose, 5)[80];
+        let run = read_bytes(&with(&loose, message + 1, length)).unwrap();
+        assert_eq!(run.len(), 80);
+    }
+}
