@@ -119,13 +119,23 @@ impl JointFriction {
     fn compensation_nm(&self, velocity_rad_s: &Joints) -> Joints {
         Joints::from_fn(|i, _| {
             let v = velocity_rad_s[i];
-            let sliding = if v == 0.0 {
-                0.0
-            } else {
-                self.stribeck_nm(i, v).copysign(v)
-            };
+            let sliding = self.stribeck_nm(i, v) * Self::direction(v);
             self.compensation * (sliding + self.viscous_nms_per_rad[i] * v)
         })
+    }
+
+    /// The direction in which a controller compensates friction for a reference of this speed, rad/s: 1, -1, or 0 at
+    /// rest.
+    ///
+    /// A joint that a straight line leaves where it is has a reference that trembles by rounding: 1e-13 rad/s, at which
+    /// the whole friction would change its sign at every step.
+    pub fn direction(speed_rad_s: f64) -> f64 {
+        const REST_RAD_S: f64 = 1e-10;
+        if speed_rad_s.abs() < REST_RAD_S {
+            0.0
+        } else {
+            speed_rad_s.signum()
+        }
     }
 }
 

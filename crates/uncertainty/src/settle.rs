@@ -12,18 +12,48 @@ const ITERATIONS: usize = 4;
 /// Step in which the bristles of the friction follow the reference, s.
 const BRISTLE_STEP_S: f64 = 1e-3;
 
+/// Ways over which bristles bend, that a joint has to go on after turning back until nothing is left of that: the
+/// rest is `exp(-10)`.
+const FORGOTTEN_WAYS: f64 = 10.0;
+
+/// Share of the way over which bristles bend that is one step: steps of one direction are taken together up to that.
+const FINE: f64 = 1.0 / 16.0;
+
 /// Friction that joints keep when they have come to rest at the end of a motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RestingFriction {
     /// Torque that the bent bristles hold at the end of the motion, believed friction, N m.
-    pub held_nm: Joints,
+    held_nm: Joints,
     /// Compensation that the controller took away when the reference stopped, N m.
-    pub compensated_nm: Joints,
+    compensated_nm: Joints,
+    /// Of joints that turn back, or begin, so shortly before the end that their bristles still know it: how they came
+    /// there.
+    late: [Option<LateTurn>; JOINT_COUNT],
 }
 
-/// Friction at the end of a motion whose reference is followed without error.
+/// The last part of a joint's way, from where its bristles are bent in one direction, or from rest.
+#[derive(Debug, Clone, PartialEq)]
+struct LateTurn {
+    /// The direction in which they are bent before; 0 at rest.
+    before: f64,
+    steps: Vec<LateStep>,
+}
+
+/// A step of a joint's reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct LateStep {
+    way_rad: f64,
+    /// Torque at which the bristles slip, N m.
+    slip_nm: f64,
+    /// What the controller adds, N m.
+    compensated_nm: f64,
+}
+
+/// Friction at the end of a motion.
 ///
-/// The bristles are those of [`JointFriction`], driven by the reference's speed.
+/// The bristles are those of [`JointFriction`]. Where a joint goes on in one direction until their bend is complete,
+/// they are driven by the reference's speed: the servo's error is constant then. A joint that turns back shortly before
+/// is followed with its servo, step by step.
 pub fn resting_friction(friction: &JointFriction, trajectory: &JointTrajectory) -> RestingFriction {
     let mut bristles = Joints::zeros();
     let mut compensated_nm = Joints::zeros();
@@ -37,7 +67,7 @@ pub fn resting_friction(friction: &JointFriction, trajectory: &JointTrajectory) 
         let speed = trajectory.sample(k as f64 * BRISTLE_STEP_S).velocity;
         for i in 0..JOINT_COUNT {
             let v = speed[i];
-            if v == 0.0 {
+            if JointFriction::direction(v) == 0.0 {
                 continue;
             }
             let slip_nm = friction.stribeck_nm(i, v);
@@ -53,21 +83,158 @@ pub fn resting_friction(friction: &JointFriction, trajectory: &JointTrajectory) 
     RestingFriction {
         held_nm: bristles.component_mul(&friction.bristle_stiffness_nm_per_rad),
         compensated_nm,
+        late: std::array::from_fn(|joint| LateTurn::of(friction, trajectory, joint, steps)),
     }
+}
+
+impl LateTurn {
+    /// The last part of a joint's way, if it did not go on in one direction until its bristles' bend was complete.
+    fn of(
+        friction: &JointFriction,
+        trajectory: &JointTrajectory,
+        joint: usize,
+        steps: usize,
+    ) -> Option<Self> {
+        let stiffness = friction.bristle_stiffness_nm_per_rad[joint];
+        let bend_rad = friction.stiction_nm[joint] / stiffness;
+        if !(bend_rad > 0.0 && bend_rad.is_finite()) {
+            return None;
+        }
+        let position = |k: usize| {
+            let time_s = (k as f64 * BRISTLE_STEP_S).min(trajectory.duration_s());
+            trajectory.sample(time_s).position[joint]
+        };
+        // Backwards to where it had gone on in one direction for long enough.
+        let enough_rad = FORGOTTEN_WAYS * bend_rad;
+        let (mut from, mut after, mut gone_rad) = (steps, position(steps), 0.0_f64);
+        let mut turns = 0;
+        while from > 0 {
+            let before = position(from - 1);
+            let speed = (after - before) / BRISTLE_STEP_S;
+            let way_rad = (after - before) * JointFriction::direction(speed).abs();
+            if way_rad != 0.0 && way_rad.signum() != gone_rad.signum() && gone_rad != 0.0 {
+                turns += 1;
+                gone_rad = 0.0;
+            }
+            gone_rad += way_rad;
+            from -= 1;
+            after = before;
+            if gone_rad.abs() >= enough_rad {
+                break;
+            }
+        }
+        if gone_rad == 0.0 || (turns == 0 && gone_rad.abs() >= enough_rad) {
+            return None;
+        }
+        let before = if gone_rad.abs() >= enough_rad {
+            gone_rad.signum()
+        } else {
+            0.0
+        };
+        let mut all: Vec<LateStep> = Vec::new();
+        let mut sign = f64::NAN;
+        for k in from..steps {
+            // The controller asks for the sign of the reference's speed, however slow.
+            let middle_s = (k as f64 + 0.5) * BRISTLE_STEP_S;
+            let middle = trajectory.sample(middle_s.min(trajectory.duration_s()));
+            let speed = middle.velocity[joint];
+            let slip_nm = friction.stribeck_nm(joint, speed);
+            let now = JointFriction::direction(speed);
+            let step = LateStep {
+                way_rad: position(k + 1) - position(k),
+                slip_nm,
+                compensated_nm: friction.compensation * slip_nm * now,
+            };
+            match all.last_mut() {
+                Some(last) if now == sign && last.way_rad.abs() < FINE * bend_rad => {
+                    last.way_rad += step.way_rad;
+                    last.slip_nm = step.slip_nm;
+                    last.compensated_nm = step.compensated_nm;
+                }
+                _ => all.push(step),
+            }
+            sign = now;
+        }
+        Some(Self { before, steps: all })
+    }
+
+    /// Error of the joint at rest, rad: reference minus position, with a servo of `kp`, bristles of `stiffness`, and
+    /// friction that is `factor` of what the controller believes.
+    ///
+    /// Slow: at every step the servo, the controller's compensation and the bristles are in balance,
+    /// `kp x + c = h`, while the bristles follow the joint, `dh/dq = stiffness (1 - h sign(dq) / F)`. Viscous
+    /// friction, and what the joint's inertia would make of a step in the compensation, are left out.
+    fn error_rad(&self, kp: f64, stiffness: f64, factor: f64) -> f64 {
+        let Some(first) = self.steps.first() else {
+            return 0.0;
+        };
+        let mut held_nm = self.before * first.slip_nm;
+        let mut error_rad = match self.before {
+            0.0 => 0.0,
+            _ => (factor * held_nm - first.compensated_nm) / kp,
+        };
+        // At the end the controller takes its compensation away.
+        let slip_nm = self.steps.last().map_or(0.0, |last| last.slip_nm);
+        let end = LateStep {
+            way_rad: 0.0,
+            slip_nm,
+            compensated_nm: 0.0,
+        };
+        for step in self.steps.iter().chain([&end]) {
+            let free_rad = error_rad + step.way_rad;
+            let wanted_nm = kp * free_rad + step.compensated_nm;
+            let (moved_rad, bent_nm) =
+                balance(held_nm, step.slip_nm, stiffness, factor, kp, wanted_nm);
+            held_nm = bent_nm;
+            error_rad = free_rad - moved_rad;
+        }
+        error_rad
+    }
+}
+
+/// How far a joint moves until `factor h + kp q` is `wanted_nm`, and what its bristles hold then: they begin with
+/// `held_nm` and slip at `slip_nm`.
+fn balance(
+    held_nm: f64,
+    slip_nm: f64,
+    stiffness: f64,
+    factor: f64,
+    kp: f64,
+    wanted_nm: f64,
+) -> (f64, f64) {
+    /// Newton steps on a concave, increasing function from 0: quadratic from the first.
+    const STEPS: usize = 8;
+    let held_nm = held_nm.clamp(-slip_nm, slip_nm);
+    let missing_nm = wanted_nm - factor * held_nm;
+    // In the direction in which it moves.
+    let sign = 1.0_f64.copysign(missing_nm);
+    let (missing_nm, room_nm) = (missing_nm.abs(), slip_nm - sign * held_nm);
+    let mut way = 0.0;
+    for _ in 0..STEPS {
+        let left = libm::exp(-way * stiffness / slip_nm);
+        let torque = factor * room_nm * (1.0 - left) + kp * way - missing_nm;
+        way -= torque / (factor * room_nm * left * stiffness / slip_nm + kp);
+    }
+    let left = libm::exp(-way * stiffness / slip_nm);
+    (sign * way, sign * (slip_nm - room_nm * left))
 }
 
 /// Error of the joints at rest by friction, rad: reference minus position.
 ///
-/// `kp`: position gains, N m/rad; `held_nm`: what the bristles held when the reference stopped,
-/// `compensated_nm`: what the controller then took away.
+/// `kp`: position gains, N m/rad; `factor`: from the friction that the controller believes in to the true one.
 pub(crate) fn friction_error(
     kp: &Joints,
     friction: &JointFriction,
-    held_nm: &Joints,
-    compensated_nm: &Joints,
+    factor: &Joints,
+    resting: &RestingFriction,
 ) -> Joints {
+    let held_nm = resting.held_nm.component_mul(factor);
+    let compensated_nm = &resting.compensated_nm;
     Joints::from_fn(|i, _| {
         let stiffness = friction.bristle_stiffness_nm_per_rad[i];
+        if let Some(late) = &resting.late[i] {
+            return late.error_rad(kp[i], stiffness, factor[i]);
+        }
         let moving = (held_nm[i] - compensated_nm[i]) / kp[i];
         moving + spring_back_rad(held_nm[i], compensated_nm[i], kp[i], stiffness)
     })
@@ -173,8 +340,7 @@ pub fn settle(
     let actuation = &truth.actuation;
     let mut error_of_friction = Joints::zeros();
     if let (Some(model), Some(resting)) = (&actuation.friction, friction) {
-        let held_nm = resting.held_nm.component_mul(&model.true_over_nominal);
-        error_of_friction = friction_error(&kp, model, &held_nm, &resting.compensated_nm);
+        error_of_friction = friction_error(&kp, model, &model.true_over_nominal, resting);
     }
     let offset = actuation.encoder.map_or_else(Joints::zeros, |encoder| {
         encoder.offset_rad + encoder.resting_rounding_rad
