@@ -48,6 +48,7 @@ pub(crate) fn analytic_budget(moments: [Moments; 2]) -> ErrorBudget {
         analytic,
         monte_carlo: None,
         radius_95_m: None,
+        drawn_radius_95_m: None,
         covariance_difference: None,
         bias_difference_m: None,
     });

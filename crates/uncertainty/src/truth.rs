@@ -566,7 +566,7 @@ pub(crate) fn breath(phase: f64) -> f64 {
 }
 
 /// Phase from a normal value, one that says whether the hold fails, and one for the phase if it does.
-fn phase(breathing: &Breathing, values: &[f64]) -> f64 {
+pub(crate) fn phase(breathing: &Breathing, values: &[f64]) -> f64 {
     let share = |value: f64| 0.5 * (value + 1.0);
     match breathing.phase_spread {
         Some(spread) if share(values[1]) >= breathing.hold_failure => {
@@ -611,7 +611,7 @@ fn registered(
 /// Uniform point of the unit disc from two uniform numbers in (-1, 1): concentric squares to
 /// concentric circles (Shirley and Chiu, J. Graphics Tools 2(3), 1997). Odd: mirrored numbers give
 /// the mirrored point.
-fn disc(x: f64, y: f64) -> Vector2<f64> {
+pub(crate) fn disc(x: f64, y: f64) -> Vector2<f64> {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
     if x == 0.0 && y == 0.0 {
         return Vector2::zeros();

@@ -31,6 +31,7 @@ from sources import SOURCES, WITHOUT_REST, Case, as_planned, errors, planned
 DRAWS = 20_000
 # Times as many where the fourth moment is that of a rare event, and a draw costs nothing.
 TIMES_AS_MANY = {"breathing": 20}
+RADIUS_TIMES_AS_MANY = 5
 # Standard errors of the draws that a moment may be off by: of 2268 moments of `imperfect.toml` one in 700 runs
 # would have one beyond by chance, and the seed is given.
 STANDARD_ERRORS = 5.0
@@ -172,6 +173,20 @@ def beyond(
     )
 
 
+def radius_beyond(sample: np.ndarray, claimed: float) -> tuple[float, float]:
+    """How far a distance that 95 % stay within is beyond its limits (more than 1 is beyond), and by how much it differs."""
+    distances = np.sort(np.linalg.norm(sample, axis=1))
+    count = len(distances)
+    half = STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / count)
+    low, middle, high = (
+        distances[min(int(count * share), count - 1)] for share in (0.95 - half, 0.95, 0.95 + half)
+    )
+    # What the budget's own moments leave out, and 0.2 % that it says the distance is known to.
+    left_out = (COVARIANCE_LEFT_OUT / 2 + 0.002) * middle
+    limit = (high - middle if claimed > middle else middle - low) + left_out
+    return float(abs(claimed - middle) / limit), float(claimed / middle - 1.0)
+
+
 def main() -> int:
     """Compares, prints a line per source, and says whether all is within the limits."""
     arguments = argparse.ArgumentParser(description=__doc__)
@@ -193,6 +208,7 @@ def main() -> int:
     chosen = [name for name in SOURCES if name in named]
     settings = {name: defaults(SOURCES[name][0], blocks[name]) for name in chosen}
     worst: dict[str, list[float]] = {}
+    radii: list[tuple[float, float]] = []
     compared = cases(scenario, report, given.results)
     if not compared:
         failures.append(
@@ -216,6 +232,24 @@ def main() -> int:
             truth = as_planned(case, given.draws * TIMES_AS_MANY.get(name, 1))
             for source in chosen if name == "all" else [name]:
                 SOURCES[source][1](case, settings[source], random, truth)
+            if name == "all":
+                # A quantile takes more draws than a moment.
+                many = as_planned(case, given.draws * RADIUS_TIMES_AS_MANY)
+                for source in chosen:
+                    SOURCES[source][1](case, settings[source], random, many)
+                for sample, where in zip(
+                    errors(case, many, random), ("at_skin", "at_target"), strict=True
+                ):
+                    claimed = reported[name][where]["radius_95_m"]
+                    radii.append(radius_beyond(sample, claimed))
+                    if radii[-1][0] > 1.0:
+                        failures.append(
+                            f"{label}, {where}: 95 % within {claimed * 1e3:.3f} mm, {radii[-1][1]:.2%} off the draws"
+                        )
+                    if radius_beyond(FOUND_OUT * sample, claimed)[0] < 1.0:
+                        failures.append(
+                            f"{label}, {where}: a distance wrong by 5 % would not be noticed"
+                        )
             for sample, where in zip(
                 errors(case, truth, random), ("at_skin", "at_target"), strict=True
             ):
@@ -248,6 +282,10 @@ def main() -> int:
         print(
             f"{name:>14}: bias {bias_m * 1e6:6.2f} um ({bias:.2f}), covariance {differs:6.2%} ({covariance:.2f})"
         )
+    if radii:
+        share, differs = (max(abs(each[k]) for each in radii) for k in (0, 1))
+        print(f"  95 % within: {differs:6.2%} ({share:.2f})")
+        print(f"figure radius_95_percent {differs * 100:.3f}")
     of_one = [found for name, found in worst.items() if name != "all"]
     print(f"figure bias_of_one_um {max(found[2] for found in of_one) * 1e6:.3f}")
     print(f"figure covariance_of_one_percent {max(found[3] for found in of_one) * 100:.3f}")

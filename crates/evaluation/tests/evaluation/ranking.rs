@@ -61,6 +61,7 @@ fn budget(rms_m: f64) -> ErrorBudget {
         monte_carlo: None,
         radius_95_m: Some(2.0 * rms_m),
         covariance_difference: None,
+        drawn_radius_95_m: None,
         bias_difference_m: None,
     };
     ErrorBudget {

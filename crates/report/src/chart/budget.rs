@@ -316,6 +316,7 @@ mod tests {
             analytic: moments,
             monte_carlo: Some(moments),
             radius_95_m: None,
+            drawn_radius_95_m: None,
             covariance_difference: None,
             bias_difference_m: None,
         }

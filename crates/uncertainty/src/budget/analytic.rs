@@ -1,9 +1,10 @@
 //! The budget by Jacobians.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, SymmetricEigen, Vector3};
-use needlebench_cell::imperfections::{ArmPopulation, Breathing, Imperfections};
+use needlebench_cell::imperfections::{ArmPopulation, Imperfections};
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints, Pose};
 
+use super::within::Errors;
 use super::{BudgetCase, BudgetError, Moments};
 use crate::fit::FitError;
 use crate::jitter::Jitter;
@@ -20,6 +21,14 @@ pub(super) fn moments(
     case: &BudgetCase<'_>,
     imperfections: &Imperfections,
 ) -> Result<[Moments; 2], BudgetError> {
+    Ok(errors(case, imperfections)?.map(|(moments, _)| moments))
+}
+
+/// The same, with how what is off is distributed.
+pub(super) fn errors(
+    case: &BudgetCase<'_>,
+    imperfections: &Imperfections,
+) -> Result<[(Moments, Errors); 2], BudgetError> {
     let target = case.target();
     let exit = case.world_from_exit();
     let layout = Layout::new(imperfections);
@@ -29,8 +38,13 @@ pub(super) fn moments(
     let joints = JointErrors::new(case, imperfections, &truth, &target);
     let from_world = case.axes_from_world();
     let points = case.planned();
-    let mut moments = [Moments::new(&Vector3::zeros(), &Matrix3::zeros()); 2];
-    for (index, point) in points.iter().enumerate() {
+    let of_point = |index: usize, point: &Point3<f64>| -> Result<_, BudgetError> {
+        let mut errors = Errors {
+            mean_m: Vector3::zeros(),
+            covariance_m2: Matrix3::zeros(),
+            breaths: Vec::new(),
+            discs: Vec::new(),
+        };
         let jacobian = tip_jacobian(case, &target, point);
         let displaced = |errors: &Joints| mean_displacement(case, &truth, &target, errors, point);
         let mut bias = displaced(&joints.bias);
@@ -60,9 +74,7 @@ pub(super) fn moments(
         if let Some(skin) = skin {
             // The phantom is believed to be where its markers have risen to.
             let risen = place.rotation * skin.breathing.skin_m;
-            let (mean, variance) = breath_moments(&skin.breathing);
-            bias += risen * mean;
-            covariance += risen * risen.transpose() * variance;
+            errors.breaths.push((risen, skin.breathing));
         }
         if let Some(error) = &imperfections.hand_eye {
             let arm = point.coords - place.translation.vector;
@@ -77,8 +89,6 @@ pub(super) fn moments(
             let in_phantom = seen.root_m * seen.root_m.transpose();
             covariance += turn * in_phantom * turn.inverse();
         }
-        let along = exit.rotation * Vector3::z();
-        let across = Matrix3::identity() - along * along.transpose();
         // As the goal has the needle, which is where the posture has it.
         let inwards = case.goal.axis.into_inner();
         let beside = Matrix3::identity() - inwards * inwards.transpose();
@@ -93,24 +103,24 @@ pub(super) fn moments(
         }
         if let Some(breathing) = &imperfections.breathing {
             let amplitude = [breathing.skin_m, breathing.target_m][index];
-            let moved = place.rotation * amplitude;
-            let (mean, variance) = breath_moments(breathing);
-            bias -= moved * mean;
-            covariance += moved * moved.transpose() * variance;
+            errors
+                .breaths
+                .push((-(place.rotation * amplitude), *breathing));
         }
         if let Some(clearance_m) = imperfections.guide_clearance_m {
             let lever = case.depths_m()[index] / case.cell.tool.guide_length_m();
-            // Variance of one coordinate of a uniform disc: a quarter of the radius squared.
-            let variance = (0.5 * clearance_m).powi(2) / 4.0;
-            covariance += across * (variance * ((1.0 + lever).powi(2) + lever.powi(2)));
+            let axes = [Vector3::x(), Vector3::y()].map(|axis| exit.rotation * axis);
+            errors.discs = [1.0 + lever, lever]
+                .map(|times| axes.map(|axis| axis * (0.5 * clearance_m * times)))
+                .into();
         }
-        let bias = from_world * bias;
-        let mut covariance = from_world * covariance * from_world.inverse();
-        // Symmetric but for rounding.
-        covariance = 0.5 * (covariance + covariance.transpose());
-        moments[index] = Moments::new(&bias, &covariance);
-    }
-    Ok(moments)
+        errors.mean_m = bias;
+        errors.covariance_m2 = covariance;
+        let errors = errors.turned(&from_world);
+        Ok((errors.moments(), errors))
+    };
+    let [skin, target] = &points;
+    Ok([of_point(0, skin)?, of_point(1, target)?])
 }
 
 /// Linear Jacobian of a point of the last link, world, m/rad.
@@ -216,14 +226,7 @@ impl JointErrors {
             (&imperfections.friction, case.friction(imperfections))
         {
             let model = joint_friction(block, Joints::repeat(1.0));
-            let error = |scale: f64| {
-                friction_error(
-                    &kp,
-                    &model,
-                    &(resting.held_nm * scale),
-                    &resting.compensated_nm,
-                )
-            };
+            let error = |scale: f64| friction_error(&kp, &model, &Joints::repeat(scale), &resting);
             bias -= error(1.0);
             // Central difference over one standard deviation: the spring-back is not linear.
             let spread = 0.5 * (error(1.0 + block.spread) - error(1.0 - block.spread));
@@ -324,106 +327,4 @@ fn calibration(
         curved += 0.5 * (ahead + behind);
     }
     (curved, covariance)
-}
-
-/// Mean and variance of `sin^4(pi phase)`: by its Fourier series under a normal or uniform phase.
-fn breath_moments(breathing: &Breathing) -> (f64, f64) {
-    /// `sin^4 x = 3/8 - 1/2 cos 2x + 1/8 cos 4x`.
-    const FOURTH: [f64; 5] = [3.0 / 8.0, -0.5, 0.125, 0.0, 0.0];
-    /// `sin^8 x = 35/128 - 7/16 cos 2x + 7/32 cos 4x - 1/16 cos 6x + 1/128 cos 8x`.
-    const EIGHTH: [f64; 5] = [
-        35.0 / 128.0,
-        -7.0 / 16.0,
-        7.0 / 32.0,
-        -1.0 / 16.0,
-        1.0 / 128.0,
-    ];
-    let mean = |series: &[f64; 5]| -> f64 {
-        series
-            .iter()
-            .enumerate()
-            .map(|(k, coefficient)| {
-                let rate = std::f64::consts::TAU * k as f64;
-                let expected = match breathing.phase_spread {
-                    // E cos(a (m + s z)) = cos(a m) exp(-(a s)^2 / 2)
-                    Some(spread) => {
-                        libm::cos(rate * breathing.phase)
-                            * libm::exp(-0.5 * (rate * spread).powi(2))
-                    }
-                    None if k == 0 => 1.0,
-                    None => 0.0,
-                };
-                coefficient * expected
-            })
-            .sum()
-    };
-    // Holds that fail are at any phase.
-    let any = |series: &[f64; 5]| {
-        let failed = breathing.hold_failure;
-        (1.0 - failed) * mean(series) + failed * series[0]
-    };
-    let first = any(&FOURTH);
-    (first, (any(&EIGHTH) - first * first).max(0.0))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Mean of 2e5 equal steps, of a smooth function: rounding.
-    const QUADRATURE: f64 = 1e-9;
-
-    #[test]
-    fn moments_of_the_breath_are_those_of_a_quadrature() {
-        for (phase_spread, hold_failure) in [(Some(0.08), 0.0), (Some(0.3), 0.0), (None, 0.0)] {
-            let breathing = Breathing {
-                skin_m: Vector3::zeros(),
-                target_m: Vector3::zeros(),
-                period_s: 4.0,
-                phase: 0.1,
-                phase_spread,
-                hold_failure,
-            };
-            let (mut weight, mut first, mut second) = (0.0, 0.0, 0.0);
-            let steps = 200_000;
-            for k in 0..steps {
-                let u = (f64::from(k) + 0.5) / f64::from(steps);
-                let (phase, density) = match phase_spread {
-                    Some(spread) => {
-                        let z = 16.0 * u - 8.0;
-                        (0.1 + spread * z, libm::exp(-0.5 * z * z))
-                    }
-                    None => (u, 1.0),
-                };
-                let share = crate::truth::breath(phase);
-                weight += density;
-                first += density * share;
-                second += density * share * share;
-            }
-            first /= weight;
-            second /= weight;
-            let (mean, variance) = breath_moments(&breathing);
-            assert!((mean - first).abs() < QUADRATURE, "{mean} {first}");
-            assert!((variance - (second - first * first)).abs() < QUADRATURE);
-        }
-    }
-
-    /// `sin^4` of a uniform phase has mean 3/8 and mean square 35/128: a mixture is between.
-    #[test]
-    fn holds_that_fail_mix_in_every_phase() {
-        let breathing = |hold_failure| Breathing {
-            skin_m: Vector3::zeros(),
-            target_m: Vector3::zeros(),
-            period_s: 4.0,
-            phase: 0.0,
-            phase_spread: Some(0.0),
-            hold_failure,
-        };
-        // Held exactly at the end of expiration there is no motion; a tenth fails.
-        let (mean, variance) = breath_moments(&breathing(0.1));
-        assert!((mean - 0.0375).abs() < QUADRATURE);
-        assert!((variance - (0.1 * 35.0 / 128.0 - 0.0375_f64.powi(2))).abs() < QUADRATURE);
-        let (mean, _) = breath_moments(&breathing(0.0));
-        assert!(mean.abs() < QUADRATURE);
-    }
 }

@@ -9,13 +9,14 @@ use super::{BudgetCase, BudgetError, Moments};
 use crate::jitter::Jitter;
 use crate::{Draw, Layout, Truth, settle};
 
-/// Moments at skin and target, and the distance that 95 % of the draws stay within, m.
+/// Moments at skin and target, and the two distances, m, between which the one is that 95 % of all draws stay within,
+/// with a confidence of 95 %.
 pub(super) fn moments(
     case: &BudgetCase<'_>,
     imperfections: &Imperfections,
     samples: usize,
     seed: u64,
-) -> Result<[(Moments, f64); 2], BudgetError> {
+) -> Result<[(Moments, [f64; 2]); 2], BudgetError> {
     let layout = Layout::new(imperfections);
     let mut random = SplitMix64::new(seed);
     let draws = layout.hypercube(samples, &mut random);
@@ -62,7 +63,27 @@ pub(super) fn moments(
         distances.sort_by(f64::total_cmp);
         (
             Moments::new(&mean, &(scatter / (count - 1.0))),
-            distances[distances.len() * 95 / 100],
+            between(&distances, 0.95),
         )
     }))
+}
+
+/// The order statistics between which a quantile is with a confidence of 95 %: how many of independent draws are below it
+/// is binomial, here as a normal.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a rank is between 0 and the number of draws"
+)]
+fn between(sorted: &[f64], share: f64) -> [f64; 2] {
+    const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
+    let count = sorted.len() as f64;
+    let (middle, half) = (
+        share * count,
+        TWO_SIDED_95 * (count * share * (1.0 - share)).sqrt(),
+    );
+    [middle - half - 1.0, middle + half].map(|rank| {
+        let last = sorted.len() - 1;
+        sorted[(rank.max(0.0).round() as usize).min(last)]
+    })
 }
