@@ -191,7 +191,13 @@ impl Layout {
                         add(JOINT_COUNT, Variable::Normal);
                         add(JOINT_COUNT, Variable::Uniform);
                     }
-                    Source::Elasticity | Source::Friction => add(JOINT_COUNT, Variable::Normal),
+                    Source::Elasticity => {
+                        let elasticity = imperfections.elasticity.as_ref();
+                        let absorbed = elasticity.and_then(|each| each.absorbed.as_ref());
+                        let modes = absorbed.map_or(0, |absorbed| absorbed.modes.len());
+                        add(JOINT_COUNT + modes, Variable::Normal);
+                    }
+                    Source::Friction => add(JOINT_COUNT, Variable::Normal),
                     Source::Payload => add(4, Variable::Normal),
                     Source::Guide => add(4, Variable::Uniform),
                     Source::HandEye => add(6, Variable::Normal),
@@ -325,10 +331,9 @@ impl Truth {
         {
             // What a calibration has taken for geometry is not there: the gears do it.
             let deviations = deviations.get_or_insert([Vector6::zeros(); JOINT_COUNT]);
-            for (taken, factor) in absorbed.iter().zip(&softness) {
-                for (deviation, part) in deviations.iter_mut().zip(taken) {
-                    *deviation -= part * *factor;
-                }
+            let taken = absorbed.taken(&softness, &of(Source::Elasticity)[JOINT_COUNT..]);
+            for (deviation, taken) in deviations.iter_mut().zip(taken) {
+                *deviation -= taken;
             }
         }
         let chain = deviations.map_or(cell.robot.chain, |deviations| {

@@ -9,9 +9,7 @@ use needlebench_kinematics::{Body, Chain, JOINT_COUNT, Pose};
 
 use super::cache::Cache;
 use super::fixtures::fixture_finding;
-use super::imperfections::{
-    GearTwist, OriginDeviations, RealArms, absorbed_sag, resolve_calibration,
-};
+use super::imperfections::{AbsorbedSag, GearTwist, RealArms, absorbed_sag, resolve_calibration};
 use super::obstacles::{UnplacedShape, unplaced_shape};
 use super::overrides::Overrides;
 use super::phantom::{UnplacedPhantom, scenario_phantom};
@@ -59,7 +57,7 @@ pub(crate) struct ModelLibrary {
     mounts: Cache<(MountSection, Pose, Option<TableSection>), Fixture>,
     obstacles: Cache<ObstacleShape, UnplacedShape>,
     real_arms: Cache<(CalibrationBlock, Option<ModelSource>), RealArms>,
-    absorbed: Cache<AbsorbedKey, [OriginDeviations; JOINT_COUNT]>,
+    absorbed: Cache<AbsorbedKey, AbsorbedSag>,
 }
 
 /// What decides what a calibration takes of an arm's sag.
@@ -245,7 +243,7 @@ impl ModelLibrary {
         tool: Option<&Tool>,
         gears: &GearTwist,
         gravity_m_s2: Vector3<f64>,
-    ) -> Arc<[OriginDeviations; JOINT_COUNT]> {
+    ) -> Arc<AbsorbedSag> {
         let key = AbsorbedKey {
             chain: robot.chain,
             bodies: robot.bodies,

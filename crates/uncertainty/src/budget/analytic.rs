@@ -1,7 +1,7 @@
 //! The budget by Jacobians.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, SymmetricEigen, Vector3};
-use needlebench_cell::imperfections::{ArmPopulation, Imperfections};
+use needlebench_cell::imperfections::{ArmPopulation, Imperfections, OriginDeviations};
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints, Pose};
 
 use super::within::Errors;
@@ -272,7 +272,7 @@ fn world_from_origins(case: &BudgetCase<'_>, q: &Joints) -> [Pose; JOINT_COUNT] 
 }
 
 /// Covariance of a point under gears of uncertain compliance, world: of each joint what its twist does,
-/// less what a calibration has taken of it for geometry.
+/// less what a calibration has taken of it for geometry; and of which calibration that was.
 fn elasticity(
     case: &BudgetCase<'_>,
     imperfections: &Imperfections,
@@ -285,18 +285,18 @@ fn elasticity(
         return Matrix3::zeros();
     };
     let origins = world_from_origins(case, q);
+    let moved = |taken: &OriginDeviations| -> Vector3<f64> {
+        let moved = (0..JOINT_COUNT).map(|i| moved_by(&origins[i], &taken[i], point));
+        moved.sum()
+    };
+    let absorbed = elasticity.absorbed.as_deref();
     let columns = (0..JOINT_COUNT).map(|joint| {
         let sags = jacobian * (joints.followed.column(joint) * joints.sag_spread[joint]);
-        let taken = elasticity
-            .absorbed
-            .as_ref()
-            .map_or_else(Vector3::zeros, |absorbed| {
-                let taken = &absorbed[joint];
-                let moved = (0..JOINT_COUNT).map(|i| moved_by(&origins[i], &taken[i], point));
-                moved.sum::<Vector3<f64>>() * elasticity.spread
-            });
-        sags + taken
+        let taken = absorbed.map_or_else(Vector3::zeros, |absorbed| moved(&absorbed.mean[joint]));
+        sags + taken * elasticity.spread
     });
+    let modes = absorbed.map_or(&[][..], |absorbed| &absorbed.modes);
+    let columns = columns.chain(modes.iter().map(moved));
     columns.map(|column| column * column.transpose()).sum()
 }
 

@@ -5,9 +5,10 @@ mod arms;
 mod localised;
 
 use nalgebra::Vector3;
-use needlebench_kinematics::{JOINT_COUNT, Joints};
+use needlebench_kinematics::Joints;
 
 pub use super::gears::GearTwist;
+pub use absorbed::AbsorbedSag;
 pub(crate) use absorbed::absorbed_sag;
 pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
@@ -93,9 +94,9 @@ pub struct Elasticity {
     pub gears: GearTwist,
     /// Relative standard deviation of each joint's compliance.
     pub spread: f64,
-    /// What a calibration that was measured on the sagging arm took for geometry, by the joint that
-    /// sagged; none if there was no such calibration.
-    pub absorbed: Option<Arc<[OriginDeviations; JOINT_COUNT]>>,
+    /// What a calibration that was measured on the sagging arm took for geometry; none if there was no such
+    /// calibration.
+    pub absorbed: Option<Arc<AbsorbedSag>>,
 }
 
 /// Error of the robot's base.
