@@ -51,6 +51,7 @@ pub use control::Control;
 pub use desk::Desk;
 pub use entry::choose_entry;
 pub use events::{EngineEvents, EventRun, StagedStop};
+pub use needlebench_geometry::mesh::{forget_kept_meshes, kept_meshes};
 pub use preview::Preview;
 pub use real_cell::servo_of;
 pub use rtde::{RtdeLog, RtdeRow, RtdeSource};

@@ -340,6 +340,7 @@ fn key(python: &Python) -> String {
         ("python", python.version.as_str()),
         ("executable", executable.as_ref()),
         ("requirements", install::requirements(python.wheels)),
+        ("seal", "bytecode too"),
     ];
     let parts = parts.into_iter().chain(SOURCES);
     let texts = parts.flat_map(|(name, text)| [name, text]);

@@ -177,7 +177,8 @@ impl HarnessProcess {
         }
         let mut command = Command::new(&environment.python);
         // Isolated: a PYTHONPATH (ROS sets one) or the user's own packages must not get in.
-        command.args(["-I", "-m", "needlebench_harness"]);
+        // Bytecode is sealed, so none is written.
+        command.args(["-I", "-B", "-m", "needlebench_harness"]);
         // The harness is one thread of work; numpy's pools would only slow its start.
         command.env("OMP_NUM_THREADS", "1");
         command.env("OPENBLAS_NUM_THREADS", "1");

@@ -3,10 +3,11 @@
 //!
 //! A file is named by a hash of all that it is made from, version included, and holds the hash of its
 //! contents; it is written whole or not at all. What cannot be read or written, or is damaged, only costs
-//! time. Folders are bounded: the oldest files make room.
+//! time. Folders are bounded: the oldest files make room. A hash that lies beside what it is of shows damage, not intent:
+//! a folder that others may write to is not read.
 
 use std::env;
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -59,7 +60,13 @@ pub(super) fn kept<T>(kind: &Kind<T>, mesh: &TriangleMesh, make: impl FnOnce() -
 
 fn kept_in<T>(folder: &Path, kind: &Kind<T>, mesh: &TriangleMesh, make: impl FnOnce() -> T) -> T {
     let path = folder.join(name_of(kind.version, mesh));
-    let known = fs::read(&path).ok();
+    let known = match other_writers(folder) {
+        Ok(None) => fs::read(&path).ok(),
+        Ok(Some(OtherWriters::Owner { .. })) => return make(),
+        // Of a version that did not keep it private, or for all to fill: begun anew.
+        Ok(Some(OtherWriters::Mode(_))) => fs::remove_dir_all(folder).ok().and(None),
+        Err(_) => None,
+    };
     if let Some(known) = known.and_then(|bytes| opened(kind, mesh, &bytes)) {
         return known;
     }
@@ -86,12 +93,115 @@ fn opened<T>(kind: &Kind<T>, mesh: &TriangleMesh, bytes: &[u8]) -> Option<T> {
 
 /// Writes a file that others may look for at the same time: whole or not at all.
 fn keep(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
-    fs::create_dir_all(folder)?;
+    private_folder(folder)?;
     let mut file = NamedTempFile::new_in(folder)?;
     file.write_all(bytes)?;
     file.persist(path)?;
     make_room(folder, MOST_BYTES)
 }
+
+/// A folder that its owner alone looks into: surfaces of patients are kept here.
+fn private_folder(folder: &Path) -> io::Result<()> {
+    let mut builder = fs::DirBuilder::new();
+    builder.recursive(true);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::DirBuilderExt;
+        builder.mode(0o700);
+    }
+    builder.create(folder)?;
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // Made by a version that did not keep it private.
+        fs::set_permissions(folder, fs::Permissions::from_mode(0o700))?;
+    }
+    Ok(())
+}
+
+/// Who else may have put what lies in a folder there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OtherWriters {
+    /// It belongs to another user than this one and root.
+    Owner {
+        /// Number of the one that it belongs to.
+        owner: u32,
+        /// Number of this one.
+        user: u32,
+    },
+    /// A group or everybody may write to it: the bits of its mode.
+    Mode(u32),
+}
+
+impl fmt::Display for OtherWriters {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Owner { owner, user } => {
+                write!(f, "belongs to user {owner}, and this is user {user}")
+            }
+            Self::Mode(mode) => write!(f, "can be written to by others (mode {mode:03o})"),
+        }
+    }
+}
+
+/// Who else may have put what lies in a folder there; `None` is nobody, as far as the system tells.
+///
+/// # Errors
+/// The folder cannot be asked about, as one that does not exist.
+pub fn other_writers(folder: &Path) -> io::Result<Option<OtherWriters>> {
+    let metadata = fs::metadata(folder)?;
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let (owner, user) = (metadata.uid(), rustix::process::geteuid().as_raw());
+        if owner != user && owner != 0 {
+            return Ok(Some(OtherWriters::Owner { owner, user }));
+        }
+        let mode = metadata.mode() & 0o777;
+        if mode & 0o022 != 0 {
+            return Ok(Some(OtherWriters::Mode(mode)));
+        }
+    }
+    #[cfg(not(unix))]
+    let _ = metadata;
+    Ok(None)
+}
+
+/// Folders of what is kept of meshes, and how many bytes they hold.
+pub fn kept_meshes() -> Vec<(PathBuf, u64)> {
+    let Some(folder) = folder() else {
+        return Vec::new();
+    };
+    let size = |folder: &Path| -> io::Result<u64> {
+        fs::read_dir(folder)?
+            .map(|entry| Ok(entry?.metadata()?.len()))
+            .sum()
+    };
+    KEPT.map(|name| folder.join(name))
+        .into_iter()
+        .filter_map(|folder| {
+            let bytes = size(&folder).ok()?;
+            Some((folder, bytes))
+        })
+        .collect()
+}
+
+/// Removes what is kept of meshes: it is made again where it is needed.
+///
+/// # Errors
+/// What cannot be removed.
+pub fn forget_kept_meshes() -> io::Result<()> {
+    for (folder, _) in kept_meshes() {
+        fs::remove_dir_all(folder)?;
+    }
+    Ok(())
+}
+
+/// Folders of all kinds.
+const KEPT: [&str; 2] = [TREES.folder, PIECES_FOLDER];
+
+/// Folder of the pieces.
+pub(super) const PIECES_FOLDER: &str = "pieces";
 
 /// Removes the files that were written first, as long as there is more than `most_bytes`.
 fn make_room(folder: &Path, most_bytes: u64) -> io::Result<()> {
@@ -200,6 +310,22 @@ pub(super) mod tests {
         for mesh in [ell(), bowl(), torus(24, 12)] {
             is_kept(&TREES, &mesh, || TriangleTree::new(&mesh));
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_others_may_have_written_is_not_read() {
+        use std::os::unix::fs::PermissionsExt;
+        let mesh = ell();
+        let (folder, path) = filled(&TREES, &mesh, || TriangleTree::new(&mesh));
+        let wrong = TriangleTree::new(&bowl());
+        fs::write(&path, sealed(&TREES, &wrong)).unwrap();
+        fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o777)).unwrap();
+        let found = kept_in(folder.path(), &TREES, &mesh, || TriangleTree::new(&mesh));
+        assert_eq!(found, TriangleTree::new(&mesh));
+        let again = || kept_in(folder.path(), &TREES, &mesh, || panic!("it is there"));
+        assert_eq!(again(), found);
+        assert_eq!(other_writers(folder.path()).unwrap(), None);
     }
 
     #[test]

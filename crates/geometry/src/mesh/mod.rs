@@ -12,6 +12,7 @@ mod stl;
 mod surface_index;
 
 pub use check::{MeshDefect, MeshFacts, check_closed, has_no_area, inverted_part, open_edges};
+pub use cache::{OtherWriters, forget_kept_meshes, kept_meshes, other_writers};
 pub(crate) use decompose::as_convex;
 pub use decompose::decompose;
 pub use fidelity::{Fidelity, points_on};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::cache::{Kind, kept};
+use super::cache::{Kind, PIECES_FOLDER, kept};
 use super::decompose::decompose;
 use super::fidelity::Fidelity;
 use super::surface_index::SurfaceIndex;
@@ -19,7 +19,7 @@ pub struct ConvexPieces {
 }
 
 const PIECES: Kind<ConvexPieces> = Kind {
-    folder: "pieces",
+    folder: PIECES_FOLDER,
     version: b"needlebench pieces 4\n",
     worth_keeping: 500,
     encode,

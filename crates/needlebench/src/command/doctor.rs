@@ -16,6 +16,7 @@ use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::output::complain;
 use needlebench_bench::provenance::GIT_REVISION;
+use needlebench_bench::{forget_kept_meshes, kept_meshes};
 
 /// How MuJoCo is set up ahead.
 pub(crate) const DOCTOR_HELP: &str = "\
@@ -48,6 +49,9 @@ pub(crate) struct DoctorArguments {
     /// windows-x86_64.
     #[arg(long, value_name = "SYSTEM", requires = "download")]
     for_platform: Option<WheelPlatform>,
+    /// Remove what is kept of meshes between runs, surfaces of patients among them; it is made again where needed.
+    #[arg(long, conflicts_with_all = ["prepare", "download"])]
+    clear_meshes: bool,
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
@@ -94,6 +98,12 @@ struct Check {
 pub(crate) fn doctor(arguments: &DoctorArguments) -> Result<ExitStatus, Failure> {
     if let Some(folder) = &arguments.download {
         return fetch_wheels(folder, arguments);
+    }
+    if arguments.clear_meshes {
+        forget_kept_meshes().map_err(|error| Failure::Ended {
+            status: ExitStatus::EnvironmentFailed,
+            message: format!("error: what is kept of meshes cannot be removed: {error}"),
+        })?;
     }
     if arguments.prepare {
         return prepare_environment(arguments);
@@ -189,6 +199,22 @@ fn megabytes(bytes: u64) -> String {
     format!("{:.1} MB", bytes as f64 * 1e-6)
 }
 
+/// What is kept of meshes, and how to be rid of it.
+fn kept_in_words() -> String {
+    let folders = kept_meshes();
+    if folders.is_empty() {
+        return "none".to_owned();
+    }
+    let texts: Vec<String> = folders
+        .iter()
+        .map(|(folder, bytes)| format!("{} in {}", megabytes(*bytes), folder.display()))
+        .collect();
+    format!(
+        "{}; surfaces of patients may be among them, --clear-meshes removes all",
+        texts.join(", ")
+    )
+}
+
 /// Checks what the engines need.
 fn check_engines(json: bool) -> Result<ExitStatus, Failure> {
     let mut checks = vec![
@@ -202,6 +228,11 @@ fn check_engines(json: bool) -> Result<ExitStatus, Failure> {
             ok: true,
             detail: std::thread::available_parallelism()
                 .map_or_else(|error| error.to_string(), |count| count.to_string()),
+        },
+        Check {
+            name: "kept meshes",
+            ok: true,
+            detail: kept_in_words(),
         },
     ];
     for engine in ENGINES {

@@ -2,8 +2,14 @@
 //!
 //! Once everything is in place it is sealed: size, times and SHA-256 of each file are written down, under a hash of
 //! all that. Later starts only look at sizes and times. A file that anybody writes to, cuts off or replaces has other
-//! ones, and is hashed again.
+//! ones, and is hashed again. A file that was not installed is one that nobody has looked at: Python runs what it finds,
+//! a `.pth` at every start. Bytecode is sealed with the rest, once what is used has been imported, and Python is started
+//! such that it writes none; other bytecode is removed.
+//!
+//! A seal is worth no more than the folder that it lies in: whoever may write there may seal what they like. Folders that
+//! others may write to are therefore not what was installed.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs::{self, Metadata};
 use std::io;
@@ -11,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use needlebench_cell::sha256_hex;
+use needlebench_geometry::mesh::other_writers;
 
 use super::install::venv_python;
 
@@ -30,18 +37,13 @@ pub(super) enum Found {
 
 /// Seals what is in `folder`, made of what `key` stands for.
 pub(super) fn seal(folder: &Path, key: &str) -> io::Result<()> {
+    for_its_owner_to_write(folder)?;
     let mut lines = String::new();
     for (path, metadata) in files(folder)? {
         let name = path.strip_prefix(folder).unwrap_or(&path).display();
-        // Python renews its bytecode as it likes.
-        if !path
-            .components()
-            .any(|part| part.as_os_str() == "__pycache__")
-        {
-            let sha256 = sha256_hex(&fs::read(&path)?);
-            // Writing to a String cannot fail.
-            let _ = writeln!(lines, "{} {sha256} {name}", state(&metadata));
-        }
+        let sha256 = sha256_hex(&fs::read(&path)?);
+        // Writing to a String cannot fail.
+        let _ = writeln!(lines, "{} {sha256} {name}", state(&metadata));
     }
     write(folder, key, &lines)
 }
@@ -63,6 +65,9 @@ pub(super) fn look(folder: &Path, key: &str) -> Found {
 
 fn check(folder: &Path, key: &str, lines: &str) -> Result<(), String> {
     let missing = |path: &Path, error: io::Error| format!("{}: {error}", path.display());
+    if let Some(others) = other_writers(folder).map_err(|error| missing(folder, error))? {
+        return Err(format!("{} {others}", folder.display()));
+    }
     let python = venv_python(folder);
     // A link to an interpreter that has gone is none.
     let interpreter = fs::metadata(&python).map_err(|error| missing(&python, error))?;
@@ -84,11 +89,59 @@ fn check(folder: &Path, key: &str, lines: &str) -> Result<(), String> {
         }
         let _ = writeln!(renewed, "{now} {sha256} {name}");
     }
+    let known: BTreeSet<&str> = lines
+        .lines()
+        .filter_map(|line| line.splitn(3, ' ').nth(2))
+        .collect();
+    if let Some(added) = added(folder, &known).map_err(|error| missing(folder, error))? {
+        return Err(format!("{} was not installed", added.display()));
+    }
     if renewed != lines {
         // Copied, for instance; where it cannot be written, the next start hashes again.
         let _ = write(folder, key, &renewed);
     }
     Ok(())
+}
+
+/// Takes the right to write to it from all but its owner, whatever the user's mask is.
+fn for_its_owner_to_write(folder: &Path) -> io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mut permissions = fs::metadata(folder)?.permissions();
+        permissions.set_mode(permissions.mode() & !0o022);
+        fs::set_permissions(folder, permissions)?;
+    }
+    #[cfg(not(unix))]
+    let _ = folder;
+    Ok(())
+}
+
+/// What Python would rather run than the source beside it.
+fn is_bytecode(path: &Path) -> bool {
+    path.components()
+        .any(|part| part.as_os_str() == "__pycache__")
+}
+
+/// A file that is not among those that were sealed, or a link among the packages, where none is installed. Bytecode that
+/// a Python wrote which somebody started by hand is removed and not missed.
+fn added(folder: &Path, known: &BTreeSet<&str>) -> io::Result<Option<PathBuf>> {
+    let is_added = |(path, metadata): &(PathBuf, Metadata)| {
+        let name = path.strip_prefix(folder).unwrap_or(path).to_string_lossy();
+        // The seal, and one that is being written.
+        if name.starts_with(SEAL) || known.contains(&*name) {
+            return false;
+        }
+        if is_bytecode(path) {
+            return fs::remove_file(path).is_err();
+        }
+        if metadata.is_symlink() {
+            return name.contains("site-packages");
+        }
+        true
+    };
+    let added = entries(folder)?.into_iter().find(is_added);
+    Ok(added.map(|(path, _)| path))
 }
 
 /// Replaces the seal as a whole: others may be reading it.
@@ -101,13 +154,20 @@ fn write(folder: &Path, key: &str, lines: &str) -> io::Result<()> {
 
 /// All files below a folder, sorted; no links.
 pub(super) fn files(folder: &Path) -> io::Result<Vec<(PathBuf, Metadata)>> {
+    let mut found = entries(folder)?;
+    found.retain(|(_, metadata)| metadata.is_file());
+    Ok(found)
+}
+
+/// All that is no folder below a folder, sorted; links are not followed.
+fn entries(folder: &Path) -> io::Result<Vec<(PathBuf, Metadata)>> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let metadata = entry.metadata()?;
         if metadata.is_dir() {
-            found.extend(files(&entry.path())?);
-        } else if metadata.is_file() {
+            found.extend(entries(&entry.path())?);
+        } else {
             found.push((entry.path(), metadata));
         }
     }
@@ -186,6 +246,50 @@ mod tests {
         let python = venv_python(cache.path());
         fs::remove_file(&python).unwrap();
         is_damaged(cache.path(), &python);
+    }
+
+    #[test]
+    fn a_file_that_was_not_installed_is_named() {
+        for name in [
+            "venv/lib/tiny/evil.pth",
+            "sitecustomize.py",
+            "venv/lib/new/b.so",
+        ] {
+            let cache = sealed();
+            let file = cache.path().join(name);
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(&file, "import os\n").unwrap();
+            is_damaged(cache.path(), &file);
+        }
+    }
+
+    #[test]
+    fn bytecode_is_what_was_sealed_or_is_removed() {
+        let cache = sealed();
+        let bytecode = cache.path().join("venv/lib/tiny/__pycache__");
+        fs::create_dir(&bytecode).unwrap();
+        let file = bytecode.join("a.pyc");
+        fs::write(&file, "").unwrap();
+        assert_eq!(look(cache.path(), "key"), Found::Complete);
+        assert!(!file.exists());
+
+        fs::write(&file, "sealed").unwrap();
+        seal(cache.path(), "key").unwrap();
+        assert_eq!(look(cache.path(), "key"), Found::Complete);
+        assert!(file.exists());
+        fs::write(&file, "another").unwrap();
+        is_damaged(cache.path(), &file);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_that_everybody_may_write_to_is_no_place_for_a_seal() {
+        use std::os::unix::fs::PermissionsExt;
+        let cache = sealed();
+        fs::set_permissions(cache.path(), fs::Permissions::from_mode(0o777)).unwrap();
+        is_damaged(cache.path(), cache.path());
+        fs::set_permissions(cache.path(), fs::Permissions::from_mode(0o755)).unwrap();
+        assert_eq!(look(cache.path(), "key"), Found::Complete);
     }
 
     #[test]
