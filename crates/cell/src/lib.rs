@@ -38,6 +38,7 @@ pub mod judgement;
 mod limit;
 mod log_columns;
 mod marker_list;
+mod mesh_file;
 mod model;
 pub mod phantom;
 mod printable;

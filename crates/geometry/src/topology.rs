@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use foldhash::fast::FixedState;
+use nalgebra::Point3;
 
 use crate::triangle_mesh::TriangleMesh;
 
@@ -41,6 +42,59 @@ pub fn weld(mesh: &mut TriangleMesh) {
         });
     }
     mesh.vertices_m = kept;
+}
+
+/// A cell and those around it.
+const AROUND: [[i64; 3]; 27] = {
+    let mut all = [[0; 3]; 27];
+    let (mut index, mut at) = (0_usize, 0_i64);
+    while index < 27 {
+        all[index] = [at % 3 - 1, at / 3 % 3 - 1, at / 9 - 1];
+        (index, at) = (index + 1, at + 1);
+    }
+    all
+};
+
+/// The mesh with one vertex for those that are nearer to it than `near_m`, the first of them; triangles that lose
+/// their area by that are left out.
+pub(crate) fn weld_near(mesh: &TriangleMesh, near_m: f64) -> TriangleMesh {
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a millionth of the mesh fits it some million times"
+    )]
+    let cell_of = |at: &Point3<f64>| {
+        at.coords
+            .map(|each| (each / near_m).floor())
+            .map(|each| each as i64)
+    };
+    let mut firsts: Map<[i64; 3], Vec<u32>> = map_for(mesh.vertices_m.len());
+    let mut stands_for = Vec::with_capacity(mesh.vertices_m.len());
+    for (number, vertex) in (0_u32..).zip(&mesh.vertices_m) {
+        let cell = cell_of(vertex);
+        let known = AROUND.iter().flat_map(|by| {
+            let beside = std::array::from_fn(|axis| cell[axis].saturating_add(by[axis]));
+            firsts.get(&beside).into_iter().flatten().copied()
+        });
+        let place = |first: u32| mesh.vertices_m[first as usize];
+        let near = known
+            .filter(|&first| (place(first) - vertex).norm() <= near_m)
+            .min();
+        if near.is_none() {
+            firsts.entry(cell.into()).or_default().push(number);
+        }
+        stands_for.push(near.unwrap_or(number));
+    }
+    let mut welded = TriangleMesh {
+        vertices_m: mesh.vertices_m.clone(),
+        triangles: mesh
+            .triangles
+            .iter()
+            .map(|corners| corners.map(|corner| stands_for[corner as usize]))
+            .filter(|[a, b, c]| a != b && b != c && c != a)
+            .collect(),
+    };
+    weld(&mut welded);
+    welded
 }
 
 /// The triangles of each part that shares no vertex with another; parts by their first triangle,

@@ -4,6 +4,7 @@ mod cache;
 mod check;
 mod decompose;
 mod fidelity;
+mod file;
 mod hull;
 mod mend;
 mod pieces;
@@ -11,16 +12,17 @@ mod solid;
 mod stl;
 mod surface_index;
 
-pub use check::{MeshDefect, MeshFacts, check_closed, has_no_area, inverted_part, open_edges};
 pub use cache::{OtherWriters, forget_kept_meshes, kept_meshes, other_writers};
+pub use check::{MeshDefect, MeshFacts, check_closed, has_no_area, inverted_part, open_edges};
 pub(crate) use decompose::as_convex;
 pub use decompose::decompose;
 pub use fidelity::{Fidelity, points_on};
+pub use file::{MeshFileError, surface_of_file};
 pub use hull::{HullError, check_thickness, convex_hull, simplified_hull};
 pub use mend::{Mended, mend};
 pub use pieces::ConvexPieces;
 pub use solid::SolidMesh;
-pub use stl::{StlError, read_stl};
+pub use stl::{is_lfs_pointer, read_stl};
 pub use surface_index::SurfaceIndex;
 
 pub use crate::measure::{area_m2, centroid_m, extent_m, size_m, volume_m3};

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use crate::common::Variety;
 use crate::common::solids::{angle_iron, bowl, box_mesh, inverted, merged, torus};
 use nalgebra::{Isometry3, Point3, Vector3};
+use needlebench_geometry::mesh::{open_edges, read_stl};
 use needlebench_geometry::sample_solids::ellipsoid;
 use needlebench_geometry::{
     ConvexMesh, PreparedShape, Separation, Shape, Solid, SolidMesh, TriangleMesh,
@@ -430,4 +431,58 @@ fn a_position_that_is_no_number_has_no_distance() {
     for (a, b) in [(nowhere, Pose::identity()), (Pose::identity(), nowhere)] {
         assert!(gap(&mesh, &a, &mesh, &b).distance_m.is_nan());
     }
+}
+
+/// A cube as a text STL, whose corners are `noise` where every other triangle has 0.
+fn noisy_cube(noise: &str) -> String {
+    let corner = |index: usize| [index >> 2 & 1, index >> 1 & 1, index & 1];
+    let faces = [
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ];
+    let mut text = "solid cube\n".to_owned();
+    for (number, face) in faces.iter().enumerate() {
+        text += "facet normal 0 0 0\nouter loop\n";
+        for &index in face {
+            text += "vertex";
+            for side in corner(index) {
+                text += match (side, number % 2) {
+                    (1, _) => " 200.0",
+                    (_, 0) => " 0.0",
+                    _ => noise,
+                };
+            }
+            text += "\n";
+        }
+        text += "endloop\nendfacet\n";
+    }
+    text + "endsolid cube\n"
+}
+
+#[test]
+fn corners_as_near_as_rounding_are_one() {
+    for noise in [" 2.731848e-16", " -1e-7", " 1.0e-5"] {
+        let text = noisy_cube(noise);
+        for text in [text.clone(), text.to_ascii_uppercase()] {
+            let mesh = read_stl(text.as_bytes(), [1e-3; 3]).unwrap();
+            assert_eq!(
+                (mesh.vertices_m.len(), open_edges(&mesh)),
+                (8, 0),
+                "{noise}"
+            );
+        }
+    }
+    // What is apart stays apart.
+    let mesh = read_stl(noisy_cube(" 0.01").as_bytes(), [1e-3; 3]).unwrap();
+    assert!(open_edges(&mesh) > 0);
 }
