@@ -63,7 +63,7 @@ impl FileKind {
             "toml" => Self::of_toml(&read_text(path).ok()?),
             "urdf" | "xacro" => Some(Self::Urdf),
             "yaml" | "yml" => Some(Self::Calibration),
-            "stl" => Some(Self::Mesh),
+            "stl" | "obj" | "dae" => Some(Self::Mesh),
             "csv" | "tsv" | "txt" => Some(Self::Table),
             "mcap" => Some(Self::Mcap),
             "html" => Some(Self::Page),

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
 
 use include_dir::{Dir, include_dir};
+use percent_encoding::percent_decode_str;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
@@ -160,9 +161,25 @@ impl Location {
         }
     }
 
-    /// A mesh file that a URDF at `self` names.
+    /// A mesh file that a URDF at `self` names: a path, `file://`, `package://NAME/...` or Gazebo's `model://NAME/...`.
+    ///
+    /// Names are URIs where a file of that very name is not there: `%20` is a blank then.
     pub(crate) fn mesh(&self, name: &str, packages: &PackagePaths) -> Result<Self, String> {
-        if let Some(rest) = name.strip_prefix("package://") {
+        let found = self.mesh_as_named(name, packages)?;
+        if !name.contains('%') || found.is_there() {
+            return Ok(found);
+        }
+        let decoded = percent_decode_str(name).decode_utf8();
+        let decoded = decoded.map_err(|_| "its `%` escapes are no UTF-8 text".to_owned())?;
+        let other = self.mesh_as_named(&decoded, packages)?;
+        Ok(if other.is_there() { other } else { found })
+    }
+
+    fn mesh_as_named(&self, name: &str, packages: &PackagePaths) -> Result<Self, String> {
+        let in_package = ["package://", "model://"]
+            .iter()
+            .find_map(|scheme| name.strip_prefix(scheme));
+        if let Some(rest) = in_package {
             let (package, inside) = rest.split_once('/').unwrap_or((rest, ""));
             return packages
                 .0
@@ -173,7 +190,18 @@ impl Location {
                     format!("package `{package}` is not known: give --package-path {package}=DIR")
                 });
         }
-        Ok(self.beside(name.strip_prefix("file://").unwrap_or(name)))
+        if let Some((scheme, _)) = name
+            .split_once("://")
+            .filter(|(scheme, _)| *scheme != "file")
+        {
+            return Err(format!(
+                "`{scheme}://` is no place that is looked in: a path, file://, package:// or model:// is"
+            ));
+        }
+        let path = name
+            .strip_prefix("file://localhost")
+            .or(name.strip_prefix("file://"));
+        Ok(self.beside(path.unwrap_or(name)))
     }
 }
 

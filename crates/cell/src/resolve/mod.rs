@@ -14,6 +14,7 @@ pub mod imperfections;
 pub mod iso9283;
 mod layout;
 mod library;
+mod mesh_file;
 mod moved;
 mod names;
 mod needle_route;
@@ -24,8 +25,8 @@ mod phantom;
 mod robot;
 mod servo;
 mod standing;
-mod stl_file;
 mod tool;
+mod unit;
 mod words;
 
 use std::path::Path;

@@ -4,21 +4,20 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Translation3, Vector3};
-use needlebench_geometry::mesh::{check_thickness, convex_hull, extent_m, size_m};
-use needlebench_geometry::{PreparedShape, Shape, Solid, TriangleMesh};
+use needlebench_geometry::mesh::{check_thickness, convex_hull, extent_m};
+use needlebench_geometry::{PreparedShape, Shape, Solid};
 use needlebench_kinematics::Pose;
 
-use super::stl_file::{FileFault, StlFile};
+use super::mesh_file::{FileFault, MeshFile};
+use super::unit::Kind;
 use super::{pose_of, static_body};
 use crate::Finding;
 use crate::files::ModelSource;
 use crate::fixtures::{Fixture, FixtureKind, world_from_gantry, world_from_table};
 use crate::model::CollisionBody;
-use crate::scenario::{AttachedTo, LengthUnit, ObstacleSection, ObstacleShape, Scenario, StlShape};
+use crate::scenario::{AttachedTo, FileShape, ObstacleSection, ObstacleShape, Scenario};
 use crate::toml_text::TomlText;
 
-/// Longest edge of the box around something in a room, m: what is outside is in another unit.
-const SIZES_M: [f64; 2] = [1e-3, 20.0];
 /// Obstacles in pictures.
 const COLOR_RGBA: [f32; 4] = [0.33, 0.52, 0.60, 1.0];
 
@@ -230,15 +229,16 @@ fn shape_of_file(
     toml: &TomlText<'_>,
     key: &str,
     section: &ObstacleSection,
-    file: &StlShape,
+    file: &FileShape,
     hulled: bool,
     base: &Path,
 ) -> Result<UnplacedShape, Finding> {
     let at_file = format!("{key}.file");
     let faulty = |fault: FileFault| toml.finding(&at_file, fault.message).hint(fault.hint);
-    let read = StlFile::read(&file.file, base).map_err(faulty)?;
+    let read = MeshFile::read(&file.file, base).map_err(faulty)?;
     let mut surface = read.surface(file.unit, file.flip);
-    check_size(toml, key, &read, file.unit, &surface)?;
+    let kind = Kind::obstacle(read.has_unit || toml.span_of(&format!("{key}.unit")).is_some());
+    read.check_unit(toml, key, &kind, file.unit)?;
     let what = format!("obstacle `{}`", section.name);
     if !hulled {
         read.check_closed(&surface, file.flip, &what)
@@ -267,38 +267,4 @@ fn shape_of_file(
         source: Some(read.source),
         prepared: OnceLock::new(),
     })
-}
-
-/// Refuses a file whose size cannot be right in the stated unit.
-fn check_size(
-    toml: &TomlText<'_>,
-    key: &str,
-    read: &StlFile,
-    unit: LengthUnit,
-    surface: &TriangleMesh,
-) -> Result<(), Finding> {
-    let size_m = size_m(surface);
-    if (SIZES_M[0]..=SIZES_M[1]).contains(&size_m.max()) {
-        return Ok(());
-    }
-    let unit_key = format!("{key}.unit");
-    let at = if toml.span_of(&unit_key).is_some() {
-        unit_key
-    } else {
-        format!("{key}.file")
-    };
-    let mm = size_m * 1e3;
-    let message = format!(
-        "{}: with `unit = \"{}\"` it is {:.3} x {:.3} x {:.3} mm, but things in a room are {} to {} mm",
-        read.file,
-        unit.key(),
-        mm.x,
-        mm.y,
-        mm.z,
-        SIZES_M[0] * 1e3,
-        SIZES_M[1] * 1e3
-    );
-    Err(toml
-        .finding(&at, message)
-        .hint("`unit` is that of the file's coordinates: mm, cm, m or in"))
 }

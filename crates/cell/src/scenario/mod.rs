@@ -67,8 +67,8 @@ pub use iso9283::{Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES};
 pub use models::shipped_tools;
 pub use motion::{MotionSection, StartSection};
 pub use obstacles::{
-    AttachedTo, BoxShape, ObstacleClass, ObstacleSection, ObstacleShape, RoundShape, SphereShape,
-    StlShape,
+    AttachedTo, BoxShape, FileShape, ObstacleClass, ObstacleSection, ObstacleShape, RoundShape,
+    SphereShape,
 };
 pub use people::{
     ElbowPreference, Handedness, PeopleSection, PersonSection, Role, Side, StaturePercentile,

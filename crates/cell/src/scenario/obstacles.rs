@@ -88,7 +88,7 @@ pub struct ObstacleSection {
     #[serde(default)]
     pub attached_to: AttachedTo,
     /// Where the origin of its shape is in the frame of `attached_to`, mm. That is the middle of a box,
-    /// a cylinder, a capsule or a sphere, and the origin of an STL file.
+    /// a cylinder, a capsule or a sphere, and the origin of a mesh file.
     #[schemars(inner(range(min = -20_000.0, max = 20_000.0)))]
     pub position_mm: [f64; 3],
     /// Roll, pitch and yaw of its shape in the frame of `attached_to`, deg.
@@ -119,11 +119,11 @@ pub struct ObstacleShape {
     pub capsule: Option<RoundShape>,
     /// A ball.
     pub sphere: Option<SphereShape>,
-    /// The convex hull of an STL file's points.
-    pub convex: Option<StlShape>,
-    /// The solid inside an STL file's surface, which is closed and need not be convex. Engines collide
+    /// The convex hull of a mesh file's points.
+    pub convex: Option<FileShape>,
+    /// The solid inside a mesh file's surface, which is closed and need not be convex. Engines collide
     /// with convex pieces that cover it.
-    pub mesh: Option<StlShape>,
+    pub mesh: Option<FileShape>,
 }
 
 /// A box.
@@ -156,13 +156,16 @@ pub struct SphereShape {
     pub radius_mm: f64,
 }
 
-/// A shape from an STL file.
+/// A shape from a mesh file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct StlShape {
-    /// STL file, relative to this file: triangles counter-clockwise seen from outside.
+// As the released schema has it.
+#[schemars(rename = "StlShape")]
+pub struct FileShape {
+    /// STL, OBJ or COLLADA (`.dae`) file, relative to this file: triangles counter-clockwise seen from outside.
     pub file: String,
-    /// Unit of the file's coordinates: `mm`, `cm`, `m` or `in`. Default mm.
+    /// Unit of the file's coordinates: `mm`, `cm`, `m` or `in`. Default mm, for what is larger than 100 mm then; COLLADA
+    /// states its own.
     #[serde(default)]
     pub unit: LengthUnit,
     /// Turns a surface that is inside out round.

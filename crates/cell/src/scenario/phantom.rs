@@ -1,4 +1,4 @@
-//! The phantom: `[phantom]`, and `[[phantom.parts]]` from the user's STL files.
+//! The phantom: `[phantom]`, and `[[phantom.parts]]` from the user's mesh files.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
@@ -89,7 +89,7 @@ pub struct PhantomSection {
     pub arms: Arms,
     /// Whether the patient has a head.
     pub head: bool,
-    /// Parts from STL files, besides the model's or in their place.
+    /// Parts from mesh files, besides the model's or in their place.
     pub parts: Vec<PartSection>,
 }
 
@@ -183,20 +183,20 @@ pub enum PartTissue {
     Lesion,
 }
 
-/// A part of the phantom from an STL file.
+/// A part of the phantom from a mesh file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PartSection {
     /// Name in reports, and of a lesion in goals: letters, digits, `-` and `_`.
     #[schemars(regex(pattern = NAME), length(max = LONGEST_NAME))]
     pub name: String,
-    /// STL file, relative to this file: a closed surface, its triangles counter-clockwise seen
-    /// from outside.
+    /// STL, OBJ or COLLADA (`.dae`) file, relative to this file: a closed surface, its triangles
+    /// counter-clockwise seen from outside.
     pub file: String,
     /// What it is made of.
     pub tissue: PartTissue,
-    /// Unit of the file's coordinates: `mm`, `cm`, `m` or `in`. Default mm; a size that such a part
-    /// cannot have is refused.
+    /// Unit of the file's coordinates: `mm`, `cm`, `m` or `in`. Default mm; COLLADA states its own.
+    /// A size that such a part cannot have is refused.
     #[serde(default)]
     pub unit: LengthUnit,
     /// Where the file's origin is in the phantom frame (left, posterior, superior), mm.

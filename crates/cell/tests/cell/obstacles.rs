@@ -250,7 +250,7 @@ fn obstacles_that_cannot_be_are_refused_at_their_key() {
         (
             shaped("{ mesh = { file = \"../models/equipment/c_arm.stl\", unit = \"m\" } }"),
             "obstacles[0].shape.mesh.unit",
-            "`unit = \"m\"`",
+            "in metres the obstacle is 881173 x",
         ),
         (
             shaped("{ mesh = { file = \"../models/equipment/c_arm.stl\", flip = true } }"),

@@ -1,8 +1,7 @@
-//! Parts of the phantom from the user's STL files, such as a segmented CT.
+//! Parts of the phantom from the user's mesh files, such as a segmented CT.
 
 mod overlap;
 mod read;
-mod unit;
 
 use std::path::Path;
 

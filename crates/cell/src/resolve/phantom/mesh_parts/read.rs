@@ -4,13 +4,12 @@ use std::path::Path;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use needlebench_geometry::TriangleMesh;
-use needlebench_geometry::mesh::size_m;
 use needlebench_kinematics::Pose;
 
-use super::unit::wrong_unit;
 use crate::Finding;
 use crate::files::ModelSource;
-use crate::resolve::stl_file::{FileFault, StlFile};
+use crate::resolve::mesh_file::{FileFault, MeshFile};
+use crate::resolve::unit::Kind;
 use crate::scenario::{PartSection, PartTissue};
 use crate::toml_text::TomlText;
 
@@ -33,8 +32,6 @@ pub(super) fn read_part(
     notes: &mut Vec<String>,
 ) -> Result<(PartMesh, ModelSource), Finding> {
     let key = |name: &str| format!("phantom.parts[{index}].{name}");
-    let file = base.join(&section.file).display().to_string();
-    let refused = |what: String| toml.finding(&key("file"), format!("{file}: {what}"));
     let faulty = |fault: FileFault| toml.finding(&key("file"), fault.message).hint(fault.hint);
     if let Some((at, value)) = (0..)
         .zip(section.position_mm)
@@ -47,19 +44,9 @@ pub(super) fn read_part(
             )
             .hint("the position is in millimetres, whatever the file's unit"));
     }
-    let read = StlFile::read(&section.file, base).map_err(faulty)?;
-    if let Some((message, hint)) = wrong_unit(section.tissue, section.unit, &size_m(&read.in_file))
-    {
-        let mut finding = refused(message).hint(hint);
-        if toml.span_of(&key("unit")).is_some() {
-            finding = Finding {
-                message: finding.message,
-                hint: finding.hint,
-                ..toml.finding(&key("unit"), "")
-            };
-        }
-        return Err(finding);
-    }
+    let read = MeshFile::read(&section.file, base).map_err(faulty)?;
+    let part = format!("phantom.parts[{index}]");
+    read.check_unit(toml, &part, &Kind::part(section.tissue), section.unit)?;
     let [roll, pitch, yaw] = section.rpy_deg.map(f64::to_radians);
     let phantom_from_file = Pose::from_parts(
         Translation3::from(Vector3::from(section.position_mm) * 1e-3),
@@ -86,6 +73,6 @@ pub(super) fn read_part(
     for vertex in &mut surface.vertices_m {
         *vertex = phantom_from_file * *vertex;
     }
-    let StlFile { file, source, .. } = read;
+    let MeshFile { file, source, .. } = read;
     Ok((PartMesh { file, surface }, source))
 }

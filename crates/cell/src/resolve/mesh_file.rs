@@ -1,13 +1,18 @@
-//! Surfaces from the user's STL files, for parts of the phantom and for obstacles.
+//! Surfaces from the user's mesh files, for parts of the phantom and for obstacles.
 
 use std::path::Path;
 
 use needlebench_geometry::TriangleMesh;
-use needlebench_geometry::mesh::{MeshDefect, MeshFacts, check_closed, read_stl};
+use needlebench_geometry::mesh::{MeshDefect, MeshFacts, check_closed, size_m};
 
+use crate::Finding;
 use crate::files::{ModelSource, source_of};
 use crate::input::read_data;
+use crate::mesh_file::{MeshFormat, read_mesh};
 use crate::scenario::LengthUnit;
+use crate::toml_text::TomlText;
+
+use super::unit::{Kind, wrong_unit};
 
 /// What is wrong with a file, and how to mend it.
 pub(super) struct FileFault {
@@ -15,15 +20,20 @@ pub(super) struct FileFault {
     pub hint: String,
 }
 
-/// A file's triangles in its own numbers.
-pub(super) struct StlFile {
+/// Of what states its unit itself the numbers are in millimetres, which is what `unit` says if nothing else is.
+const PER_METRE: f64 = 1e3;
+
+/// A file's triangles in its own numbers, those of COLLADA in millimetres.
+pub(super) struct MeshFile {
     /// As users see it.
     pub file: String,
     pub in_file: TriangleMesh,
+    /// Whether the file states its unit.
+    pub has_unit: bool,
     pub source: ModelSource,
 }
 
-impl StlFile {
+impl MeshFile {
     /// Reads a file that is named relative to the scenario's folder.
     pub fn read(name: &str, base: &Path) -> Result<Self, FileFault> {
         let path = base.join(name);
@@ -34,16 +44,58 @@ impl StlFile {
                 .hint("the path is relative to the scenario's folder")
                 .to_owned(),
         })?;
-        let in_file = read_stl(&bytes, [1.0; 3]).map_err(|why| FileFault {
+        let wanted = "STL, OBJ and COLLADA (.dae) are read".to_owned();
+        if let Some(other) = MeshFormat::other(name) {
+            return Err(FileFault {
+                message: format!("{file}: it is {other}"),
+                hint: format!("{wanted}: convert it"),
+            });
+        }
+        let format = MeshFormat::of_name(name).unwrap_or(MeshFormat::Stl);
+        let scale = if format == MeshFormat::Collada {
+            PER_METRE
+        } else {
+            1.0
+        };
+        let in_file = read_mesh(&bytes, format, [scale; 3]).map_err(|why| FileFault {
             message: format!("{file}: {why}"),
-            hint: "an STL file is wanted, binary or text".to_owned(),
+            hint: wanted,
         })?;
         let source = source_of(file.clone(), &bytes);
         Ok(Self {
             file,
             in_file,
+            has_unit: format == MeshFormat::Collada,
             source,
         })
+    }
+
+    /// Refuses a file whose size cannot be right in its unit; `file` and `unit` are keys of the section `key`.
+    pub fn check_unit(
+        &self,
+        toml: &TomlText<'_>,
+        key: &str,
+        kind: &Kind,
+        unit: LengthUnit,
+    ) -> Result<(), Finding> {
+        let [at_file, at_unit] = ["file", "unit"].map(|name| format!("{key}.{name}"));
+        let said = |message: &str| format!("{}: {message}", self.file);
+        if self.has_unit && unit != LengthUnit::Mm {
+            return Err(toml
+                .finding(&at_unit, said("the file states its unit"))
+                .hint("leave `unit` out"));
+        }
+        let Some((message, hint)) = wrong_unit(kind, unit, &size_m(&self.in_file)) else {
+            return Ok(());
+        };
+        let is_stated = toml.span_of(&at_unit).is_some();
+        let at = if is_stated { at_unit } else { at_file };
+        let hint = if self.has_unit {
+            "the file states its unit: is it the right one?".to_owned()
+        } else {
+            hint
+        };
+        Err(toml.finding(&at, said(&message)).hint(hint))
     }
 
     /// Its surface in metres, in the file's own frame.

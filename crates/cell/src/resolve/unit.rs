@@ -34,25 +34,58 @@ impl PartTissue {
     }
 }
 
-fn noun(tissue: PartTissue) -> &'static str {
-    match tissue {
-        PartTissue::Skin => "a skin",
-        PartTissue::Bone => "a bone",
-        PartTissue::Vessel => "a vessel",
-        PartTissue::Organ => "an organ",
-        PartTissue::Lung => "a lung",
-        PartTissue::Lesion => "a lesion",
+/// What something is, and how large such a thing is.
+pub(super) struct Kind {
+    subject: &'static str,
+    noun: &'static str,
+    /// Longest edge of the box around it: least, usual and most, mm.
+    sizes_mm: [f64; 3],
+    /// Whether a smaller one may be meant, if the unit is stated.
+    may_be_smaller: bool,
+}
+
+impl Kind {
+    pub(super) fn part(tissue: PartTissue) -> Self {
+        Self {
+            subject: "the part",
+            noun: match tissue {
+                PartTissue::Skin => "a skin",
+                PartTissue::Bone => "a bone",
+                PartTissue::Vessel => "a vessel",
+                PartTissue::Organ => "an organ",
+                PartTissue::Lung => "a lung",
+                PartTissue::Lesion => "a lesion",
+            },
+            sizes_mm: tissue.sizes_mm(),
+            may_be_smaller: false,
+        }
+    }
+
+    /// Something in a room. Of a file whose unit nobody has stated the thing is no speck: 1 m is 39 inches, and 39 mm if
+    /// it is taken for millimetres.
+    pub(super) fn obstacle(is_stated: bool) -> Self {
+        Self {
+            subject: "the obstacle",
+            noun: "a thing in a room",
+            sizes_mm: [if is_stated { 5.0 } else { 100.0 }, 1000.0, 20_000.0],
+            may_be_smaller: !is_stated,
+        }
     }
 }
 
-/// Message and hint about a part, if its size cannot be right in the stated unit. `size` is in the
-/// file's numbers.
+/// Message and hint about something from a file, if its size cannot be right in the stated unit. `size` is in the file's
+/// numbers.
 pub(super) fn wrong_unit(
-    tissue: PartTissue,
+    kind: &Kind,
     stated: LengthUnit,
     size: &Vector3<f64>,
 ) -> Option<(String, String)> {
-    let [least_mm, usual_mm, most_mm] = tissue.sizes_mm();
+    let &Kind {
+        subject,
+        noun,
+        sizes_mm: [least_mm, usual_mm, most_mm],
+        may_be_smaller,
+    } = kind;
     let millimetres = |unit: LengthUnit| size.max() * unit.metres() * 1e3;
     let fits = |unit: &LengthUnit| (least_mm..=most_mm).contains(&millimetres(*unit));
     if fits(&stated) {
@@ -68,18 +101,22 @@ pub(super) fn wrong_unit(
         )
     };
     let message = format!(
-        "in {} the part is {}, but {} is {least_mm} to {most_mm} mm",
+        "in {} {subject} is {}, but {noun} is {least_mm} to {most_mm} mm",
         stated.words(),
         box_of(stated),
-        noun(tissue)
     );
+    let smaller = if may_be_smaller && millimetres(stated) < least_mm {
+        format!("; if it is that small, say so: unit = \"{}\"", stated.key())
+    } else {
+        String::new()
+    };
     let mut likely: Vec<LengthUnit> = LengthUnit::ALL.into_iter().filter(fits).collect();
     let unlikeness = |unit: LengthUnit| libm::log(millimetres(unit) / usual_mm).abs();
     likely.sort_by(|a, b| unlikeness(*a).total_cmp(&unlikeness(*b)));
     Some(match likely.split_first() {
         None => (
             message,
-            "no usual unit makes it plausible: is it the right file and tissue?".to_owned(),
+            format!("no usual unit makes it plausible: is it the right file?{smaller}"),
         ),
         Some((&best, others)) => {
             let others: Vec<String> = others
@@ -92,7 +129,7 @@ pub(super) fn wrong_unit(
                     best.words(),
                     box_of(best)
                 ),
-                format!("set unit = \"{}\"{}", best.key(), others.concat()),
+                format!("set unit = \"{}\"{}{smaller}", best.key(), others.concat()),
             )
         }
     })
@@ -117,7 +154,7 @@ mod tests {
     use super::*;
 
     fn guess(tissue: PartTissue, stated: LengthUnit, size: [f64; 3]) -> Option<(String, String)> {
-        wrong_unit(tissue, stated, &Vector3::from(size))
+        wrong_unit(&Kind::part(tissue), stated, &Vector3::from(size))
     }
 
     #[test]
@@ -161,5 +198,29 @@ mod tests {
         let (message, hint) = guess(PartTissue::Skin, LengthUnit::Mm, [1e-6; 3]).unwrap();
         assert!(!message.contains("looks like"), "{message}");
         assert!(hint.contains("right file"), "{hint}");
+    }
+
+    #[test]
+    fn things_that_would_be_specks_are_asked_about() {
+        let guess = |is_stated, stated, size: [f64; 3]| {
+            wrong_unit(&Kind::obstacle(is_stated), stated, &Vector3::from(size))
+        };
+        // A C-arm in metres, and in inches.
+        let (message, hint) = guess(false, LengthUnit::Mm, [0.9, 0.3, 1.4]).unwrap();
+        assert!(
+            message.contains("looks like metres (900 x 300 x 1400 mm)"),
+            "{message}"
+        );
+        assert!(
+            hint.starts_with("set unit = \"m\"") && hint.ends_with("unit = \"mm\""),
+            "{hint}"
+        );
+        let (_, hint) = guess(false, LengthUnit::Mm, [35.4, 11.8, 55.1]).unwrap();
+        assert!(hint.starts_with("set unit = \"in\""), "{hint}");
+        assert_eq!(guess(true, LengthUnit::Mm, [35.4, 11.8, 55.1]), None);
+        // What no room has, whoever states it.
+        assert!(guess(true, LengthUnit::Mm, [0.9, 0.3, 1.4]).is_some());
+        assert!(guess(true, LengthUnit::M, [900.0, 300.0, 1400.0]).is_some());
+        assert_eq!(guess(false, LengthUnit::Mm, [900.0, 300.0, 1400.0]), None);
     }
 }
