@@ -188,12 +188,7 @@ impl Calibration {
         let mut text = commented(comment);
         text += "kinematics:\n";
         for (i, link) in LINKS.iter().enumerate() {
-            let mut origin = chain.joints[i].parent_from_joint;
-            if i == 0 {
-                origin = base_from_base_link() * origin;
-            }
-            let [x, y, z] = origin.translation.vector.into();
-            let (roll, pitch, yaw) = origin.rotation.euler_angles();
+            let [x, y, z, roll, pitch, yaw] = origin_in_file(chain, i);
             // Writing to a text cannot fail.
             let _ = write!(text, "  {link}:\n    x: {x}\n    y: {y}\n    z: {z}\n");
             let _ = write!(
@@ -249,7 +244,8 @@ impl Calibration {
                  {nearest}` with `ik` and `fk`, `--robot URDF` with every command"
             )));
         }
-        let likely = if nearest.name() == arm {
+        let turned = self.with_usual_frames(geometry);
+        let likely = if nearest.name() == arm || turned.is_some() {
             String::new()
         } else {
             format!("; most like it is a {nearest}, off by {near}")
@@ -257,7 +253,60 @@ impl Calibration {
         Err(finding(format!(
             "this is not a calibration of the {arm} in use: it is off by {off} ({limits}){likely}"
         ))
-        .hint("the poses are each link's in its parent, as ROS's `ur_calibration` writes them"))
+        .hint(turned.unwrap_or_else(|| {
+            "the poses are each link's in its parent, as ROS's `ur_calibration` writes them"
+                .to_owned()
+        })))
+    }
+
+    /// The same arm with link frames turned about their axes as ROS's are, if that makes it a calibration of an arm with
+    /// these lengths: which were turned, and the poses that take their place.
+    ///
+    /// A frame that is turned about its joint's axis and turned back by the next joint's origin moves no flange: both
+    /// rotations are about the axis that the joint turns about. It turns the link's own shape.
+    fn with_usual_frames(&self, geometry: &UrGeometry) -> Option<String> {
+        let nominal = geometry.chain();
+        let mut chain = self.chain();
+        let mut turned = Vec::new();
+        let mut changed = [false; JOINT_COUNT];
+        for joint in 0..JOINT_COUNT - 1 {
+            let [own, usual] = [&chain, &nominal].map(|it| it.joints[joint].parent_from_joint);
+            let off = (usual.rotation.inverse() * own.rotation).to_rotation_matrix();
+            let angle = libm::atan2(off[(0, 1)] - off[(1, 0)], off[(0, 0)] + off[(1, 1)]);
+            if angle.abs() <= ACCEPTED_RAD {
+                continue;
+            }
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+            chain.joints[joint].parent_from_joint.rotation *= turn;
+            let next = &mut chain.joints[joint + 1].parent_from_joint;
+            *next = Pose::from_parts(Translation3::identity(), turn.inverse()) * *next;
+            turned.push(format!(
+                "{}'s by {:.1} deg",
+                LINKS[joint],
+                -angle.to_degrees()
+            ));
+            changed[joint] = true;
+            changed[joint + 1] = true;
+        }
+        let off = OriginDeviation::between(&chain, &nominal);
+        if turned.is_empty() || off.severity() > 1.0 || UrGeometry::of_chain(&chain).is_err() {
+            return None;
+        }
+        let poses = (0..JOINT_COUNT)
+            .filter(|&joint| changed[joint])
+            .map(|joint| {
+                let [x, y, z, roll, pitch, yaw] = origin_in_file(&chain, joint);
+                format!(
+                    "{}: x: {x}, y: {y}, z: {z}, roll: {roll}, pitch: {pitch}, yaw: {yaw}",
+                    LINKS[joint]
+                )
+            });
+        Some(format!(
+            "link frames are turned about their own axes against ROS's ({}), which the next origin undoes; the same arm \
+             with ROS's frames has {}",
+            turned.join(", "),
+            poses.collect::<Vec<_>>().join("; ")
+        ))
     }
 
     /// Replaces the joint origins of a robot; geometry and masses stay with their link's frame.
@@ -284,6 +333,17 @@ impl Calibration {
         });
         Ok(())
     }
+}
+
+/// Place and fixed-axis angles of a joint's origin as a file has them, m and rad; the chain's are from `base_link`.
+fn origin_in_file(chain: &Chain, joint: usize) -> [f64; 6] {
+    let mut origin = chain.joints[joint].parent_from_joint;
+    if joint == 0 {
+        origin = base_from_base_link() * origin;
+    }
+    let [x, y, z] = origin.translation.vector.into();
+    let (roll, pitch, yaw) = origin.rotation.euler_angles();
+    [x, y, z, roll, pitch, yaw]
 }
 
 /// Refuses a robot whose link frames are not `ur_description`'s: the calibration would move its

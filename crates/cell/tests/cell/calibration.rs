@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::Matrix4;
-use needlebench_cell::{Calibration, Finding, Overrides, load_robot, load_scenario};
-use needlebench_kinematics::{Joints, UrModel, base_from_base_link, rotation_angle_between};
+use nalgebra::{Matrix4, Translation3, UnitQuaternion, Vector3};
+use needlebench_cell::{
+    Calibration, Finding, MOVING_LINK_LABELS, Overrides, load_robot, load_scenario,
+};
+use needlebench_kinematics::{Joints, Pose, UrModel, base_from_base_link, rotation_angle_between};
 
 /// A UR3 whose file writes the identity as three half turns.
 const HALF_TURNS: &str = include_str!("calibration/ur3_half_turns.yaml");
@@ -209,6 +211,65 @@ fn calibration_of_a_relative_is_refused_with_the_arm_it_is_of() {
         finding.message.contains("another robot, a UR3 "),
         "{finding}"
     );
+}
+
+/// A frame that is turned about its own axis and turned back by the next origin is the same arm: the poses that are
+/// offered in its place are that arm's, in ROS's frames.
+#[test]
+fn frames_turned_about_their_axes_are_named_and_the_equivalent_is_offered() {
+    let usual = read(UR3E).chain();
+    for (joint, angle) in [(0, -2.0), (1, 0.5), (2, std::f64::consts::PI), (4, 1.0)] {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+        let mut chain = usual;
+        chain.joints[joint].parent_from_joint.rotation *= turn;
+        let next = &mut chain.joints[joint + 1].parent_from_joint;
+        *next = Pose::from_parts(Translation3::identity(), turn.inverse()) * *next;
+        let turned = read(&Calibration::written(&chain, "turned"));
+        let finding = turned
+            .chain_of("UR3e", &UrModel::Ur3e.geometry())
+            .unwrap_err();
+        assert!(!finding.message.contains("most like"), "{finding}");
+        let hint = finding.hint.unwrap();
+        let said = format!("{}'s by ", MOVING_LINK_LABELS[joint]);
+        let degrees: f64 = hint
+            .split_once(&said)
+            .unwrap()
+            .1
+            .split(' ')
+            .next()
+            .unwrap()
+            .parse()
+            .unwrap();
+        assert!(
+            (degrees.abs() - angle.to_degrees().abs()).abs() < 1.0,
+            "{hint}"
+        );
+        // What is offered is accepted in the place of what is there, and moves the flange nowhere.
+        let (_, offered) = hint.split_once("frames has ").unwrap();
+        let mut mended = turned.clone();
+        for block in offered.split("; ") {
+            let (link, pose) = block.split_once(": ").unwrap();
+            let at = MOVING_LINK_LABELS
+                .iter()
+                .position(|name| *name == link)
+                .unwrap();
+            let numbers: Vec<f64> = pose
+                .split(", ")
+                .map(|each| each.split_once(": ").unwrap().1.parse().unwrap())
+                .collect();
+            mended.origins[at] = Pose::from_parts(
+                Translation3::new(numbers[0], numbers[1], numbers[2]),
+                UnitQuaternion::from_euler_angles(numbers[3], numbers[4], numbers[5]),
+            );
+        }
+        let mended = mended.chain_of("UR3e", &UrModel::Ur3e.geometry()).unwrap();
+        let q = Joints::new(0.4, -1.3, 1.1, 0.7, -0.9, 2.0);
+        let [a, b] = [&mended, &chain].map(|chain| chain.base_link_from_flange(&q));
+        assert!(
+            (a.to_homogeneous() - b.to_homogeneous()).amax() < 1e-12,
+            "{joint}"
+        );
+    }
 }
 
 #[test]
