@@ -62,6 +62,9 @@ pub(super) fn joint_limit(urdf: &Urdf, joint: &UrdfJoint) -> Result<JointLimit, 
         }
         (limit.lower, limit.upper)
     };
+    // The controller lets the joint go no farther.
+    let [soft_lower, soft_upper] = joint.soft.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+    let (lower_rad, upper_rad) = (lower_rad.max(soft_lower), upper_rad.min(soft_upper));
     for (key, value, [least, most], unit, hint) in [
         (
             "velocity",

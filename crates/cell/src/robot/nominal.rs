@@ -16,6 +16,7 @@ pub(crate) fn nominal_robot(arm: &Arc<Arm>, packages: &PackagePaths) -> Result<R
         &MissingInertia::Error,
         Pose::identity(),
         Some(arm),
+        None,
     )
 }
 

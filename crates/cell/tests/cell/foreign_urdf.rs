@@ -139,13 +139,18 @@ fn box_volume_m3() -> f64 {
     8.0 * HALF_M.map(f64::from).iter().product::<f64>()
 }
 
-/// The mesh that stands last among the upper arm's collision geometry.
+/// The only mesh among the upper arm's collision geometry; the box does not enclose the arm that the joints make, so
+/// primitives stand beside it.
 fn upper_arm_hull(robot: &Robot) -> TriangleMesh {
-    let solid = robot.links[1].solids.last().unwrap();
-    let Shape::Convex(mesh) = &solid.shape else {
-        panic!("{solid:?}")
+    let solids = &robot.links[1].solids;
+    let meshes = solids.iter().filter_map(|solid| match &solid.shape {
+        Shape::Convex(mesh) => Some(mesh.0.clone()),
+        _ => None,
+    });
+    let [mesh] = &meshes.collect::<Vec<_>>()[..] else {
+        panic!("{solids:?}")
     };
-    mesh.0.clone()
+    mesh.clone()
 }
 
 #[track_caller]
@@ -494,4 +499,421 @@ fn a_joint_name_is_not_given_twice() {
         finding.contains("joint 'elbow_joint' is there twice"),
         "{finding}"
     );
+}
+
+/// The shipped arm's file with other collision shapes.
+fn shipped(arm: &str, change: impl Fn(&str) -> String) -> Result<Robot, Finding> {
+    let path = format!(
+        "{}/../../models/{arm}/{arm}.urdf",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    Files::new(&change(&fs::read_to_string(path).unwrap())).load()
+}
+
+/// A text without its elements of a kind.
+fn without(text: &str, tag: &str) -> String {
+    let (open, close) = (format!("<{tag}"), format!("</{tag}>"));
+    let mut left = text;
+    let mut kept = String::new();
+    while let Some(start) = left.find(&open) {
+        kept += &left[..start];
+        left = &left[start + left[start..].find(&close).unwrap() + close.len()..];
+    }
+    kept + left
+}
+
+/// Reach of each link's shapes in a bundle of directions, m.
+fn reaches(robot: &Robot) -> Vec<f64> {
+    let mut all = Vec::new();
+    for link in std::iter::once(&robot.base).chain(&robot.links) {
+        for k in 0..50 {
+            let (sine, cosine) = libm::sincos(f64::from(k) * 2.4);
+            let height = 1.0 - f64::from(k) / 24.5;
+            let ring = (1.0 - height * height).max(0.0).sqrt();
+            let way = Vector3::new(ring * cosine, ring * sine, height);
+            let points = link.solids.iter().flat_map(|solid| {
+                let surface = solid.shape.surface(1e-4);
+                let placed = surface.vertices_m.into_iter();
+                placed.map(|point| (solid.parent_from_shape * point).coords.dot(&way))
+            });
+            all.push(points.fold(f64::NEG_INFINITY, f64::max));
+        }
+    }
+    all
+}
+
+#[test]
+fn a_known_arm_without_shapes_is_as_large_as_it_is() {
+    for arm in ["ur3", "ur3e", "ur5e"] {
+        let whole = reaches(&shipped(arm, str::to_owned).unwrap());
+        // All shapes out; a speck at the flange; links as thin as sticks.
+        let stick = "<collision><geometry><cylinder radius=\"0.01\" length=\"0.3\"/></geometry></collision>";
+        let bare = |text: &str| without(text, "collision");
+        let speck = "<collision><geometry><box size=\"0.01 0.01 0.01\"/></geometry></collision>";
+        let changes: [&dyn Fn(&str) -> String; 3] = [
+            &bare,
+            &|text| {
+                bare(text).replacen(
+                    "<link name=\"wrist_3_link\">",
+                    &format!("<link name=\"wrist_3_link\">{speck}"),
+                    1,
+                )
+            },
+            &|text| {
+                let mut text = bare(text);
+                for link in ["upper_arm_link", "forearm_link"] {
+                    let open = format!("<link name=\"{link}\">");
+                    text = text.replacen(&open, &format!("{open}{stick}"), 1);
+                }
+                text
+            },
+        ];
+        for (index, change) in changes.into_iter().enumerate() {
+            let robot = shipped(arm, change).unwrap();
+            assert!(
+                robot.unseen.is_empty(),
+                "{arm}, {index}: {:?}",
+                robot.unseen
+            );
+            assert_noted(&robot, "stand for it");
+            for (own, known) in reaches(&robot).iter().zip(&whole) {
+                assert!(own >= &(known - 1e-6), "{arm}, {index}: {own} {known}");
+            }
+        }
+    }
+}
+
+#[test]
+fn shapes_that_fill_their_links_stay_as_they_are() {
+    for arm in ["ur3", "ur3e", "ur5e"] {
+        let robot = shipped(arm, str::to_owned).unwrap();
+        let told = robot.notes.iter().any(|note| note.contains("stand for it"));
+        assert!(!told, "{:?}", robot.notes);
+    }
+}
+
+#[test]
+fn an_unknown_arm_without_shapes_is_unseen() {
+    // A forearm that no arm has.
+    let longer = |text: &str| {
+        let text = without(text, "collision");
+        assert!(text.contains("-0.2132"), "the forearm's length");
+        text.replace("-0.2132", "-0.2532")
+    };
+    let robot = shipped("ur3e", longer).unwrap();
+    let names: Vec<&str> = robot.unseen.iter().map(|part| part.name.as_str()).collect();
+    assert!(names.contains(&"forearm") && names.len() == 7, "{names:?}");
+}
+
+#[test]
+fn what_is_bolted_on_and_drawn_has_to_have_a_shape() {
+    let camera = r#"
+      <link name="camera_link"><visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>
+      <joint name="camera_joint" type="fixed"><parent link="wrist_3_link"/><child link="camera_link"/></joint>
+    </robot>"#;
+    let robot = shipped("ur3e", |text| text.replace("</robot>", camera)).unwrap();
+    let names: Vec<&str> = robot.unseen.iter().map(|part| part.name.as_str()).collect();
+    assert_eq!(names, ["camera_link"]);
+}
+
+#[test]
+fn a_prefix_is_taken_off_and_told() {
+    let prefixed = |text: &str| {
+        let mut text = text.to_owned();
+        for key in [
+            "<link name=\"",
+            "<joint name=\"",
+            "<parent link=\"",
+            "<child link=\"",
+        ] {
+            text = text.replace(key, &format!("{key}left_"));
+        }
+        text
+    };
+    let robot = shipped("ur3e", prefixed).unwrap();
+    assert_noted(&robot, "without their prefix `left_`");
+    assert_eq!(robot.chain, shipped("ur3e", str::to_owned).unwrap().chain);
+}
+
+/// A file with two UR3e, or with the prefix of one of them.
+fn two_arms(prefix: Option<&str>) -> Result<Robot, Finding> {
+    let path = format!("{}/../../models/ur3e/ur3e.urdf", env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(path).unwrap();
+    let (start, end) = (text.find("<link").unwrap(), text.find("</robot>").unwrap());
+    let arm = |prefix: &str| {
+        let keys = [
+            "<link name=\"",
+            "<joint name=\"",
+            "<parent link=\"",
+            "<child link=\"",
+        ];
+        keys.iter().fold(text[start..end].to_owned(), |text, key| {
+            text.replace(key, &format!("{key}{prefix}"))
+        })
+    };
+    let root = arm("left_");
+    let root = root.split('"').nth(1).unwrap();
+    let both = format!(
+        "{}{}{}<joint name=\"between\" type=\"fixed\"><parent link=\"left_base_link\"/><child link=\"{}\"/>\
+         <origin xyz=\"0 0.9 0\"/></joint></robot>",
+        &text[..start],
+        arm("left_"),
+        arm("right_"),
+        root.replace("left_", "right_"),
+    );
+    let files = Files::new(&both);
+    load_robot(&Overrides {
+        prefix: prefix.map(str::to_owned),
+        ..files.overrides()
+    })
+}
+
+#[test]
+fn of_two_arms_one_is_said_and_the_other_stands_still() {
+    let finding = two_arms(None).unwrap_err().to_string();
+    assert!(
+        finding.contains("2 UR arms, `left_` and `right_`") && finding.contains("--prefix"),
+        "{finding}"
+    );
+    let finding = two_arms(Some("middle_")).unwrap_err().to_string();
+    assert!(
+        finding.contains("there is `left_` and `right_`"),
+        "{finding}"
+    );
+    let single = shipped("ur3e", str::to_owned).unwrap();
+    let mut bases = Vec::new();
+    for prefix in ["left_", "right_"] {
+        let robot = two_arms(Some(prefix)).unwrap();
+        assert_eq!(robot.chain, single.chain);
+        assert_noted(&robot, &format!("without their prefix `{prefix}`"));
+        assert_noted(&robot, "taken to stand still at 0");
+        // The other arm is of the base, as far away as the file has it.
+        assert!(robot.base.solids.len() >= single.base.solids.len() + 6);
+        bases.push(reaches(&robot));
+    }
+    let most = |index: usize| bases[index][..50].iter().copied().fold(0.0, f64::max);
+    assert!(most(0) > 0.9 && most(1) > 0.9, "{} {}", most(0), most(1));
+}
+
+#[test]
+fn a_mass_alone_is_a_points_and_moments_alone_are_nobodys() {
+    let given = |policy: Option<MissingInertia>, change: &dyn Fn(&str) -> String| {
+        let path = format!("{}/../../models/ur3/ur3.urdf", env!("CARGO_MANIFEST_DIR"));
+        let files = Files::new(&change(&fs::read_to_string(path).unwrap()));
+        load_robot(&Overrides {
+            missing_inertia: policy,
+            ..files.overrides()
+        })
+    };
+    let single = |text: &str, tag: &str| {
+        let mut text = text.to_owned();
+        while let Some(start) = text.find(&format!("<{tag} ")) {
+            let end = start + text[start..].find("/>").unwrap() + 2;
+            text.replace_range(start..end, "");
+        }
+        text
+    };
+    let whole = shipped("ur3", str::to_owned).unwrap();
+    for (tag, lacks, told) in [
+        ("inertia", "no moment of inertia", "it is a point mass"),
+        ("mass", "no mass", "has no <mass>, and does not count"),
+    ] {
+        let change = |text: &str| single(text, tag);
+        let finding = given(None, &change).unwrap_err().to_string();
+        assert!(finding.contains(lacks), "{finding}");
+        assert!(
+            finding.contains("--missing-inertia nominal-ur3"),
+            "{finding}"
+        );
+        let robot = given(Some(MissingInertia::Nominal), &change).unwrap();
+        assert_noted(&robot, told);
+        for (own, known) in robot.bodies.iter().zip(&whole.bodies) {
+            assert!((own.mass_kg - known.mass_kg).abs() < 1e-12);
+            assert!((own.inertia_kgm2 - known.inertia_kgm2).amax() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn an_element_of_thousands_of_attributes_is_refused() {
+    let mut many = String::new();
+    for k in 0..5000 {
+        write!(many, " a{k}=\"1\"").unwrap();
+    }
+    let text = changed(
+        "<link name=\"world\"/>",
+        &format!("<link name=\"world\"{many}/>"),
+    );
+    let finding = Files::new(&text).load().unwrap_err().to_string();
+    assert!(finding.contains("5001 attributes"), "{finding}");
+}
+
+/// The box as an OBJ file, and as a COLLADA file in centimetres.
+fn box_obj(per_metre: f32) -> String {
+    let mut text = String::new();
+    for at in 0..8 {
+        let [x, y, z] = corner(at).map(|number| number * per_metre);
+        writeln!(text, "v {x} {y} {z}").unwrap();
+    }
+    for [a, b, c] in BOX {
+        writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).unwrap();
+    }
+    text
+}
+
+fn box_dae() -> String {
+    let corners = (0..8)
+        .flat_map(corner)
+        .map(|number| (number * 100.0).to_string());
+    let corners: Vec<String> = corners.collect();
+    let indices: Vec<String> = BOX.as_flattened().iter().map(usize::to_string).collect();
+    format!(
+        "<COLLADA version=\"1.4.1\"><asset><unit meter=\"0.01\"/><up_axis>Z_UP</up_axis></asset>\
+         <library_geometries><geometry id=\"g\"><mesh><source id=\"s\"><float_array id=\"f\">{}</float_array>\
+         <technique_common><accessor source=\"#f\" count=\"8\" stride=\"3\"/></technique_common></source>\
+         <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#s\"/></vertices><triangles>\
+         <input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><p>{}</p></triangles></mesh></geometry>\
+         </library_geometries></COLLADA>",
+        corners.join(" "),
+        indices.join(" ")
+    )
+}
+
+#[test]
+fn obj_and_collada_are_read_whatever_the_case_of_their_names() {
+    for (name, scale, bytes) in [
+        ("box.OBJ", "", box_obj(1.0).into_bytes()),
+        (
+            "mm.obj",
+            r#"scale="0.001 0.001 0.001""#,
+            box_obj(1000.0).into_bytes(),
+        ),
+        ("box.dae", "", box_dae().into_bytes()),
+        ("box.DAE", "", box_dae().into_bytes()),
+        ("loud.STL", "", box_stl(b"a box", 1.0)),
+    ] {
+        let files = Files::new(&collision_mesh(
+            &format!("package://my-robot/meshes/{name}"),
+            scale,
+        ));
+        files.add(name, &bytes);
+        assert_is_the_box(&upper_arm_hull(&files.load().unwrap()));
+    }
+}
+
+#[test]
+fn formats_that_are_not_read_are_named() {
+    for (name, what) in [
+        ("box.ply", "a PLY file"),
+        ("b.GLB", "a glTF file"),
+        ("b.step", "a STEP file"),
+        ("b", "no file of a mesh"),
+    ] {
+        let files = Files::new(&collision_mesh(
+            &format!("package://my-robot/meshes/{name}"),
+            "",
+        ));
+        files.add(name, b"ply");
+        let finding = files.load().unwrap_err();
+        assert!(finding.message.contains(what), "{finding}");
+        assert!(finding.hint.unwrap().contains("STL, OBJ and COLLADA"));
+    }
+}
+
+#[test]
+fn names_of_meshes_are_uris() {
+    for filename in [
+        "package://my-robot/meshes/a%20box.stl",
+        "model://my-robot/meshes/a%20box.stl",
+        "package://my-robot/meshes/a box.stl",
+        "file://package/meshes/a box.stl",
+    ] {
+        let files = Files::new(&collision_mesh(filename, ""));
+        files.add("a box.stl", &box_stl(b"a box", 1.0));
+        assert_is_the_box(&upper_arm_hull(&files.load().unwrap()));
+    }
+    // A file whose name has the escape itself.
+    let files = Files::new(&collision_mesh("package://my-robot/meshes/50%25.stl", ""));
+    files.add("50%25.stl", &box_stl(b"a box", 1.0));
+    assert_is_the_box(&upper_arm_hull(&files.load().unwrap()));
+    let finding = Files::new(&collision_mesh("https://example.org/box.stl", "")).load();
+    assert!(
+        finding
+            .unwrap_err()
+            .message
+            .contains("`https://` is no place")
+    );
+}
+
+#[test]
+fn an_axis_of_a_joint_that_does_not_turn_does_not_matter() {
+    let zero = |text: &str| {
+        text.replacen(
+            "<child link=\"tool0\"/>",
+            "<child link=\"tool0\"/><axis xyz=\"0 0 0\"/>",
+            1,
+        )
+    };
+    assert_eq!(
+        shipped("ur3e", zero).unwrap().chain,
+        shipped("ur3e", str::to_owned).unwrap().chain
+    );
+}
+
+#[test]
+fn soft_limits_narrow_a_joint_and_are_told() {
+    let soft = "<safety_controller soft_lower_limit=\"-0.5\" soft_upper_limit=\"0.5\" k_position=\"20\" k_velocity=\"0\"/>";
+    let with = |text: &str| {
+        let at = text.find("<joint name=\"wrist_3_joint\"").unwrap();
+        let end = at + text[at..].find("</joint>").unwrap();
+        format!("{}{soft}{}", &text[..end], &text[end..])
+    };
+    let robot = shipped("ur3e", with).unwrap();
+    let limit = robot.limits.0[5];
+    assert_eq!([limit.lower_rad, limit.upper_rad], [-0.5, 0.5]);
+    assert_noted(&robot, "wrist_3_joint");
+}
+
+#[test]
+fn a_declared_latin_1_is_read() {
+    let path = format!("{}/../../models/ur3e/ur3e.urdf", env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(path).unwrap();
+    let files = Files::new("");
+    let write = |declaration: &str| {
+        let (_, rest) = text.split_once("?>").unwrap();
+        let mut bytes = declaration.as_bytes().to_vec();
+        bytes.extend(b"<!-- Pr\xfcfstand -->");
+        bytes.extend(rest.bytes().filter(u8::is_ascii));
+        fs::write(files.folder.path().join("arm.urdf"), bytes).unwrap();
+    };
+    write("<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>");
+    files.load().unwrap();
+    write("<?xml version=\"1.0\"?>");
+    let finding = files.load().unwrap_err().to_string();
+    assert!(finding.contains("ISO-8859-1"), "{finding}");
+}
+
+#[test]
+fn another_makers_arm_is_called_that() {
+    let kuka = |text: &str| {
+        let mut text = text.to_owned();
+        for (index, name) in needlebench_kinematics::JOINT_NAMES.iter().enumerate() {
+            text = text.replace(name, &format!("joint_a{}", index + 1));
+        }
+        text
+    };
+    let finding = shipped("ur3e", kuka).unwrap_err().to_string();
+    assert!(
+        finding.contains("no UR arm") && finding.contains("Universal Robots"),
+        "{finding}"
+    );
+}
+
+#[test]
+fn a_pointer_of_git_lfs_is_called_that() {
+    let files = Files::new(&collision_mesh("package://my-robot/meshes/box.stl", ""));
+    let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n";
+    files.add("box.stl", pointer);
+    let finding = files.load().unwrap_err().to_string();
+    assert!(finding.contains("git lfs pull"), "{finding}");
 }

@@ -126,7 +126,7 @@ fn what_other_programs_read_is_left_to_them() {
     );
 }
 
-/// urdf-rs takes the words that are numbers, and passes over the others.
+/// Readers of URDFs take the words that are numbers, and pass over the others.
 #[test]
 fn numbers_are_counted_and_read_as_such() {
     let origin = r#"<origin xyz="0 0 0.1219""#;
@@ -229,7 +229,7 @@ fn elements_are_there_as_often_as_they_should_be() {
         &["<mass> twice"],
     );
     let finding = load(&changed(mass, "")).unwrap_err().to_string();
-    says(&finding, &["<inertial> has no <mass>"]);
+    says(&finding, &["link 'shoulder_link' has no mass"]);
     let sphere = r#"<sphere radius="0.03"/>"#;
     let finding = load(&changed(sphere, &format!("{sphere}<box size=\"1 1 1\"/>"))).unwrap_err();
     says(&finding.to_string(), &["more than one shape"]);

@@ -1,9 +1,9 @@
 //! The markup of a URDF: where everything stands, what is missing, and what nobody would read.
 
-use std::ops::Range;
-
 use roxmltree::Node;
 
+use super::nodes::{child, is_own, opening_tag, own_children, tag};
+use super::values::{JointValues, LinkValues, MaterialValues};
 use super::vocabulary::{
     Attribute, Count, Form, Kind, NEEDLE_GUIDE_TAG, Plausible, QUATERNION, ROBOT,
 };
@@ -15,45 +15,24 @@ use crate::{Finding, nearest_name};
 /// put names of their own.
 const MISSPELT: f64 = 0.85;
 
-/// What `urdf-rs` does not tell of a file, and the text that it is given.
+/// Most attributes of an element: those of one are compared with one another, in time that grows with their square.
+const MOST_ATTRIBUTES: usize = 64;
+
+/// What a URDF says, checked.
 #[derive(Debug, Default)]
 pub(super) struct Markup {
+    /// Empty if it has none.
+    pub name: String,
     /// The links in the file's order.
-    pub links: Vec<LinkPlace>,
+    pub links: Vec<LinkValues>,
     /// The joints in the file's order.
-    pub joints: Vec<JointPlace>,
+    pub joints: Vec<JointValues>,
+    /// Materials that links share, by their names.
+    pub materials: Vec<MaterialValues>,
     /// needlebench's own element.
     pub needle_guide: Option<NeedleGuide>,
     /// What was passed over and may matter.
     pub notes: Vec<String>,
-    /// The root element without what is not read.
-    pub plain: String,
-    /// Bytes of the file that are not read, in order, and what stands in their place.
-    edits: Vec<(Range<usize>, &'static str)>,
-}
-
-/// Where a link stands. All places are those of opening tags.
-#[derive(Debug)]
-pub(super) struct LinkPlace {
-    pub span: Range<usize>,
-    /// Places of mass and moments, if it has an `<inertial>`.
-    pub inertial: Option<[Range<usize>; 2]>,
-    /// Shapes of the collision elements.
-    pub collisions: Vec<Range<usize>>,
-    /// Shapes of the visual elements.
-    pub visuals: Vec<Range<usize>>,
-}
-
-/// Where a joint stands.
-#[derive(Debug)]
-pub(super) struct JointPlace {
-    pub span: Range<usize>,
-    /// Of its `<origin>`; the joint's own if it has none.
-    pub origin: Range<usize>,
-    /// Of its `<limit>`, if it has one.
-    pub limit: Option<Range<usize>>,
-    /// Whether the limit says where the joint's range begins and ends.
-    pub has_range: [bool; 2],
 }
 
 /// Reads the markup of a URDF and checks every element and attribute that stands for something.
@@ -86,34 +65,20 @@ pub(super) fn read_markup(file: &str, text: &str) -> Result<Markup, Finding> {
     reader.check(root, &ROBOT)?;
     for node in own_children(root) {
         match tag(node) {
-            "link" => {
-                let place = link_place(node);
-                reader.markup.links.push(place);
-            }
+            "link" => reader.markup.links.push(LinkValues::of(node)),
             "joint" => {
                 reader.check_joint_type(node)?;
-                reader.markup.joints.push(JointPlace {
-                    span: opening_tag(node),
-                    origin: opening_tag(child(node, "origin").unwrap_or(node)),
-                    limit: child(node, "limit").map(opening_tag),
-                    has_range: ["lower", "upper"].map(|name| {
-                        child(node, "limit").is_some_and(|limit| limit.has_attribute(name))
-                    }),
-                });
+                reader.markup.joints.push(JointValues::of(node));
             }
+            "material" => reader.markup.materials.push(MaterialValues::of(node)),
             NEEDLE_GUIDE_TAG => reader.markup.needle_guide = Some(reader.needle_guide(node)?),
             _ => {}
         }
     }
-    let mut markup = reader.markup;
-    let mut at = root.range().start;
-    for (range, instead) in std::mem::take(&mut markup.edits) {
-        markup.plain += &text[at..range.start];
-        markup.plain += instead;
-        at = range.end;
-    }
-    markup.plain += &text[at..root.range().end];
-    Ok(markup)
+    root.attribute("name")
+        .unwrap_or_default()
+        .clone_into(&mut reader.markup.name);
+    Ok(reader.markup)
 }
 
 struct Reader<'a> {
@@ -127,12 +92,16 @@ impl Reader<'_> {
         Finding::new(self.file, message).at(self.text, opening_tag(node))
     }
 
-    fn pass_over(&mut self, node: Node<'_, '_>) {
-        self.markup.edits.push((node.range(), ""));
-    }
-
     /// Checks an element and all below it.
     fn check(&mut self, node: Node<'_, '_>, kind: &'static Kind) -> Result<(), Finding> {
+        let attributes = node.attributes().len();
+        if attributes > MOST_ATTRIBUTES {
+            let message = format!(
+                "{} has {attributes} attributes, and no element has more than {MOST_ATTRIBUTES}",
+                label(node)
+            );
+            return Err(self.finding(node, message));
+        }
         for attribute in node.attributes().filter(|each| each.namespace().is_none()) {
             let known = kind.attributes.iter().map(|each| each.name);
             if !known.clone().any(|name| name == attribute.name()) {
@@ -147,16 +116,13 @@ impl Reader<'_> {
         if tag(node) == "origin" {
             self.check_orientation(node)?;
         }
-        if tag(node) == "material" && node.attribute("name").is_none() {
-            // urdf-rs wants a name, which nothing here depends on.
-            let after_tag = node.range().start + "<material".len();
-            self.markup.edits.push((after_tag..after_tag, " name=\"\""));
-        }
         for inner in node.children().filter(Node::is_element) {
             let name = tag(inner);
             if !is_own(inner) || kind.passed_over.contains(&name) {
-                self.pass_over(inner);
                 continue;
+            }
+            if name == "inertial" {
+                self.note_half_inertial(node, inner);
             }
             if let Some(known) = kind.children.iter().find(|each| each.tag == name) {
                 if known.count != Count::Many && child(node, name) != Some(inner) {
@@ -164,9 +130,6 @@ impl Reader<'_> {
                     return Err(self.finding(inner, message));
                 }
                 self.check(inner, known.kind)?;
-                if name == NEEDLE_GUIDE_TAG {
-                    self.pass_over(inner);
-                }
                 continue;
             }
             if tag(node) == "geometry" {
@@ -179,7 +142,6 @@ impl Reader<'_> {
             self.refuse_or_note(inner, kind, name, known, message, |near| {
                 format!("<{near}>")
             })?;
-            self.pass_over(inner);
         }
         for known in kind.children {
             if known.count == Count::One && child(node, known.tag).is_none() {
@@ -199,6 +161,23 @@ impl Reader<'_> {
             }
         }
         Ok(())
+    }
+
+    /// A mass without moments is a point's; moments without a mass are nobody's.
+    fn note_half_inertial(&mut self, link: Node<'_, '_>, inertial: Node<'_, '_>) {
+        let what = match ["mass", "inertia"].map(|tag| child(inertial, tag).is_some()) {
+            [true, true] => return,
+            [true, false] => "has no <inertia>: it is a point mass",
+            [false, _] => "has no <mass>, and does not count",
+        };
+        let line = self.finding(inertial, "").line;
+        let line = line.map_or(String::new(), |line| format!(":{line}"));
+        let note = format!(
+            "{}{line}: the <inertial> of {} {what}",
+            self.file,
+            label(link)
+        );
+        self.markup.notes.push(note);
     }
 
     /// Refuses what looks like a slip, and notes what may be another program's; `name` stands in
@@ -251,7 +230,6 @@ impl Reader<'_> {
         }
     }
 
-    /// urdf-rs skips words that are no numbers, and takes those that are not finite.
     fn numbers(
         &self,
         node: Node<'_, '_>,
@@ -327,7 +305,7 @@ impl Reader<'_> {
         })
     }
 
-    /// urdf-rs drops a quaternion in silence where the file is of version 1.0.
+    /// Programs drop a quaternion in silence where the file is of version 1.0.
     fn check_orientation(&self, origin: Node<'_, '_>) -> Result<(), Finding> {
         if origin.attribute(QUATERNION).is_none() {
             return Ok(());
@@ -384,27 +362,6 @@ impl Reader<'_> {
     }
 }
 
-fn link_place(node: Node<'_, '_>) -> LinkPlace {
-    let shapes = |each: &str| {
-        own_children(node)
-            .filter(|inner| tag(*inner) == each)
-            .filter_map(|inner| own_children(child(inner, "geometry")?).next())
-            .map(opening_tag)
-            .collect()
-    };
-    LinkPlace {
-        span: opening_tag(node),
-        inertial: child(node, "inertial").and_then(|inertial| {
-            Some([
-                opening_tag(child(inertial, "mass")?),
-                opening_tag(child(inertial, "inertia")?),
-            ])
-        }),
-        collisions: shapes("collision"),
-        visuals: shapes("visual"),
-    }
-}
-
 /// An element of xacro's namespace, or one with an unexpanded attribute. A file that xacro wrote
 /// declares the namespace too, and comments may hold anything.
 fn is_xacro(node: &Node<'_, '_>) -> bool {
@@ -415,37 +372,10 @@ fn is_xacro(node: &Node<'_, '_>) -> bool {
             .any(|attribute| attribute.value().contains("${"))
 }
 
-fn tag<'a>(node: Node<'a, '_>) -> &'a str {
-    node.tag_name().name()
-}
-
 /// An element in messages: `joint 'elbow_joint'`, `<origin>`.
 fn label(node: Node<'_, '_>) -> String {
     match (tag(node), node.attribute("name")) {
         (tag @ ("joint" | "link"), Some(name)) => format!("{tag} '{name}'"),
         (tag, _) => format!("<{tag}>"),
     }
-}
-
-fn child<'a, 'd>(node: Node<'a, 'd>, name: &str) -> Option<Node<'a, 'd>> {
-    own_children(node).find(|inner| tag(*inner) == name)
-}
-
-/// Elements that are the format's own, not of another namespace.
-fn own_children<'a, 'd>(node: Node<'a, 'd>) -> impl Iterator<Item = Node<'a, 'd>> {
-    node.children()
-        .filter(|inner| inner.is_element() && is_own(*inner))
-}
-
-fn is_own(node: Node<'_, '_>) -> bool {
-    let home = node.document().root_element().tag_name().namespace();
-    node.tag_name().namespace() == home
-}
-
-/// Bytes of an element's opening tag: where a caret should stand.
-fn opening_tag(node: Node<'_, '_>) -> Range<usize> {
-    let range = node.range();
-    let text = &node.document().input_text()[range.clone()];
-    let length = text.find('>').map_or(text.len(), |end| end + 1);
-    range.start..range.start + length
 }

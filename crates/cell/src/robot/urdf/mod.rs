@@ -1,21 +1,24 @@
 //! URDF files as trees of links and joints, with the place of everything for error messages.
 //!
-//! `urdf-rs` reads the values. What it loses is kept by [`markup`]: a missing `<inertial>` or `<limit>`
-//! has to be told from a zero one, what it does not know must not pass in silence, and every complaint
-//! names a line. `package://` is resolved by [`crate::files`]: the crate's own way needs ROS.
+//! `roxmltree` reads the XML, [`markup`] holds every element and attribute against a vocabulary, [`values`] takes what they
+//! say: a missing `<inertial>` or `<limit>` is told from a zero one, what nobody would read does not pass in silence, and
+//! every complaint names a line. `package://` is resolved by [`crate::files`].
 
 mod markup;
+mod nodes;
 mod tree;
+mod values;
 mod vocabulary;
 
+use std::borrow::Cow;
 use std::ops::Range;
 
-use nalgebra::{Matrix3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Matrix3, UnitVector3, Vector3};
 use needlebench_kinematics::{Body, Pose};
-use urdf_rs::JointType;
 
 use crate::Finding;
-use markup::{JointPlace, LinkPlace, read_markup};
+use markup::read_markup;
+use values::{InertialValues, JointValues, LinkValues, MaterialValues, ShapeValues};
 
 /// Types of joints that a URDF can have.
 const JOINT_TYPES: [&str; 6] = [
@@ -86,6 +89,8 @@ pub(crate) struct UrdfJoint {
     pub parent_from_joint: Pose,
     pub axis: UnitVector3<f64>,
     pub limit: Option<Limit>,
+    /// Lower and upper of its `<safety_controller>`, if it has one that limits positions.
+    pub soft: Option<[f64; 2]>,
     pub span: Range<usize>,
     /// Of its `<origin>`, or its own.
     pub origin_span: Range<usize>,
@@ -116,37 +121,53 @@ pub(crate) struct Urdf {
     pub notes: Vec<String>,
 }
 
+/// Text of an XML file: UTF-8, or ISO-8859-1 where the file declares it.
+fn text_of<'a>(file: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>, Finding> {
+    /// Where a declaration ends at the latest.
+    const LONGEST_DECLARATION: usize = 200;
+    let error = match std::str::from_utf8(bytes) {
+        Ok(text) => return Ok(text.into()),
+        Err(error) => error,
+    };
+    let head = &bytes[..bytes.len().min(LONGEST_DECLARATION)];
+    let head = String::from_utf8_lossy(head).to_ascii_lowercase();
+    let declaration = head
+        .split_once("?>")
+        .map_or("", |(declaration, _)| declaration);
+    let latin_1 = ["iso-8859-1", "latin1", "latin-1"];
+    if latin_1.iter().any(|name| declaration.contains(name)) {
+        // Its bytes are the first code points of Unicode.
+        return Ok(bytes.iter().map(|&byte| char::from(byte)).collect());
+    }
+    let message = format!("not UTF-8 text: {error}");
+    Err(Finding::new(file, message).hint(
+        "save it as UTF-8, or declare what it is: <?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>",
+    ))
+}
+
 impl Urdf {
     pub(crate) fn parse(file: &str, bytes: &[u8]) -> Result<Self, Finding> {
-        let text = std::str::from_utf8(bytes)
-            .map_err(|error| Finding::new(file, format!("not UTF-8 text: {error}")))?;
+        let text = text_of(file, bytes)?;
+        let text = text.as_ref();
         let markup = read_markup(file, text)?;
-        let robot = urdf_rs::read_from_string(&markup.plain)
-            .map_err(|error| Finding::new(file, format!("not a URDF: {error}")))?;
-        let counts = |links: usize, joints: usize| format!("{links} links and {joints} joints");
-        let (read, there) = (
-            counts(robot.links.len(), robot.joints.len()),
-            counts(markup.links.len(), markup.joints.len()),
-        );
-        if read != there {
-            return Err(Finding::new(file, format!("of {there} {read} can be read")));
-        }
         let reader = Reader { file, text };
-        let links = robot.links.iter().zip(&markup.links);
-        let joints = robot.joints.iter().zip(&markup.joints);
         let urdf = Self {
             file: file.to_owned(),
             text: text.to_owned(),
-            name: if robot.name.is_empty() {
+            name: if markup.name.is_empty() {
                 "robot".to_owned()
             } else {
-                robot.name.clone()
+                markup.name
             },
-            links: links
-                .map(|(link, place)| reader.link(link, place, &robot.materials))
+            links: markup
+                .links
+                .into_iter()
+                .map(|link| reader.link(link, &markup.materials))
                 .collect::<Result<_, _>>()?,
-            joints: joints
-                .map(|(joint, place)| reader.joint(joint, place))
+            joints: markup
+                .joints
+                .into_iter()
+                .map(|joint| reader.joint(joint))
                 .collect::<Result<_, _>>()?,
             needle_guide: markup.needle_guide,
             notes: markup.notes,
@@ -181,7 +202,7 @@ impl Urdf {
     }
 }
 
-/// From the crate's types to ours.
+/// Checks values that a form alone does not.
 struct Reader<'a> {
     file: &'a str,
     text: &'a str,
@@ -192,70 +213,46 @@ impl Reader<'_> {
         Finding::new(self.file, message).at(self.text, span.clone())
     }
 
-    fn link(
-        &self,
-        link: &urdf_rs::Link,
-        place: &LinkPlace,
-        materials: &[urdf_rs::Material],
-    ) -> Result<UrdfLink, Finding> {
-        if [link.collision.len(), link.visual.len()]
-            != [place.collisions.len(), place.visuals.len()]
-        {
-            let message = format!("the geometry of link '{}' cannot be read", link.name);
-            return Err(self.finding(&place.span, message));
-        }
-        let collisions = link.collision.iter().zip(&place.collisions);
-        let visuals = link.visual.iter().zip(&place.visuals);
+    fn link(&self, link: LinkValues, materials: &[MaterialValues]) -> Result<UrdfLink, Finding> {
+        let mass = link.inertial.as_ref();
         Ok(UrdfLink {
-            name: link.name.clone(),
-            inertial: place
+            mass_span: mass.map_or_else(|| link.span.clone(), |mass| mass.mass_span.clone()),
+            inertial: link
                 .inertial
                 .as_ref()
-                .map(|places| self.inertial(&link.inertial, places))
+                .map(|values| self.inertial(values))
                 .transpose()?,
-            mass_span: match &place.inertial {
-                Some([mass, _]) => mass.clone(),
-                None => place.span.clone(),
-            },
-            collisions: collisions
-                .map(|(each, span)| {
-                    self.element(each.name.as_ref(), &each.origin, &each.geometry, None, span)
-                })
+            collisions: link
+                .collisions
+                .into_iter()
+                .map(|each| self.element(each, None))
                 .collect::<Result<_, _>>()?,
-            visuals: visuals
-                .map(|(each, span)| {
+            visuals: link
+                .visuals
+                .into_iter()
+                .map(|each| {
                     let color = color_of(each.material.as_ref(), materials);
-                    self.element(
-                        each.name.as_ref(),
-                        &each.origin,
-                        &each.geometry,
-                        color,
-                        span,
-                    )
+                    self.element(each, color)
                 })
                 .collect::<Result<_, _>>()?,
-            span: place.span.clone(),
+            name: link.name,
+            span: link.span,
         })
     }
 
-    fn inertial(
-        &self,
-        inertial: &urdf_rs::Inertial,
-        [mass, moments]: &[Range<usize>; 2],
-    ) -> Result<Body, Finding> {
-        let mass_kg = inertial.mass.value;
+    fn inertial(&self, inertial: &InertialValues) -> Result<Body, Finding> {
+        let InertialValues {
+            mass_kg,
+            moments_kgm2: [xx, xy, xz, yy, yz, zz],
+            mass_span: mass,
+            moments_span: moments,
+            ..
+        } = inertial;
+        let mass_kg = *mass_kg;
         if mass_kg < 0.0 {
             return Err(self.finding(mass, format!("the mass is {mass_kg} kg")));
         }
-        let urdf_rs::Inertia {
-            ixx: xx,
-            ixy: xy,
-            ixz: xz,
-            iyy: yy,
-            iyz: yz,
-            izz: zz,
-        } = inertial.inertia;
-        let tensor = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        let tensor = Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
         let principal = tensor.symmetric_eigenvalues();
         // A rigid body's largest moment is at most the sum of the others; printed digits round.
         if principal.min() < 0.0 || 2.0 * principal.max() > principal.sum() * (1.0 + 1e-6) {
@@ -290,103 +287,64 @@ impl Reader<'_> {
             com_m: Vector3::zeros(),
             inertia_kgm2: tensor,
         }
-        .transformed(&pose_of(&inertial.origin)))
+        .transformed(&inertial.origin))
     }
 
     fn element(
         &self,
-        name: Option<&String>,
-        origin: &urdf_rs::Pose,
-        geometry: &urdf_rs::Geometry,
+        shape: ShapeValues,
         color_rgba: Option<[f32; 4]>,
-        span: &Range<usize>,
     ) -> Result<Element, Finding> {
-        let geometry = match geometry {
-            urdf_rs::Geometry::Box { size } => {
-                if size.iter().any(|edge| *edge <= 0.0) {
-                    return Err(self.finding(span, "the edges of a <box> have to be positive"));
-                }
-                Geometry::Box { size_m: size.0 }
-            }
-            urdf_rs::Geometry::Cylinder { radius, length } => Geometry::Cylinder {
-                radius_m: *radius,
-                length_m: *length,
-            },
-            urdf_rs::Geometry::Sphere { radius } => Geometry::Sphere { radius_m: *radius },
-            urdf_rs::Geometry::Mesh { filename, scale } => Geometry::Mesh {
-                filename: filename.clone(),
-                scale: scale.map_or([1.0; 3], |scale| scale.0),
-            },
-            urdf_rs::Geometry::Capsule { .. } => {
-                return Err(self
-                    .finding(span, "<capsule> is no geometry")
-                    .hint("box, cylinder, sphere or mesh"));
-            }
-        };
+        if let Geometry::Box { size_m } = &shape.geometry
+            && size_m.iter().any(|edge| *edge <= 0.0)
+        {
+            return Err(self.finding(&shape.span, "the edges of a <box> have to be positive"));
+        }
         Ok(Element {
-            name: name.cloned(),
-            link_from_geometry: pose_of(origin),
-            geometry,
+            name: shape.name,
+            link_from_geometry: shape.origin,
+            geometry: shape.geometry,
             color_rgba,
-            span: span.clone(),
+            span: shape.span,
         })
     }
 
-    fn joint(&self, joint: &urdf_rs::Joint, place: &JointPlace) -> Result<UrdfJoint, Finding> {
-        let name = &joint.name;
-        let axis = Vector3::from(joint.axis.xyz.0);
-        let axis = UnitVector3::try_new(axis, 1e-9).ok_or_else(|| {
-            let message = format!("the axis of joint '{name}' has no length");
-            self.finding(&place.span, message)
-        })?;
-        let limit = &joint.limit;
+    fn joint(&self, joint: JointValues) -> Result<UrdfJoint, Finding> {
+        let axis = UnitVector3::try_new(Vector3::from(joint.axis), 1e-9);
+        // Exporters write `0 0 0` at joints that turn about nothing.
+        let axis = match axis {
+            None if joint.kind == JointKind::Fixed => Vector3::x_axis(),
+            axis => axis.ok_or_else(|| {
+                let message = format!("the axis of joint '{}' has no length", joint.name);
+                self.finding(&joint.span, message)
+            })?,
+        };
         Ok(UrdfJoint {
-            name: name.clone(),
-            kind: match joint.joint_type {
-                JointType::Revolute => JointKind::Revolute,
-                JointType::Continuous => JointKind::Continuous,
-                JointType::Fixed => JointKind::Fixed,
-                _ => JointKind::Other,
-            },
-            parent: joint.parent.link.clone(),
-            child: joint.child.link.clone(),
-            parent_from_joint: pose_of(&joint.origin),
+            name: joint.name,
+            kind: joint.kind,
+            parent: joint.parent,
+            child: joint.child,
+            parent_from_joint: joint.origin,
             axis,
-            limit: place.limit.is_some().then_some(Limit {
-                lower: limit.lower,
-                upper: limit.upper,
-                has_range: place.has_range,
-                effort: limit.effort,
-                velocity: limit.velocity,
-            }),
-            span: place.span.clone(),
-            origin_span: place.origin.clone(),
-            limit_span: place.limit.clone().unwrap_or_else(|| place.span.clone()),
+            limit: joint.limit,
+            // Both are 0 where they are left out: it limits speeds alone.
+            soft: joint.soft.filter(|range| *range != [0.0, 0.0]),
+            limit_span: joint.limit_span.unwrap_or_else(|| joint.span.clone()),
+            span: joint.span,
+            origin_span: joint.origin_span,
         })
     }
-}
-
-fn pose_of(origin: &urdf_rs::Pose) -> Pose {
-    let [x, y, z] = origin.xyz.0;
-    let [roll, pitch, yaw] = origin.rpy.0;
-    Pose::from_parts(
-        Translation3::new(x, y, z),
-        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
-    )
 }
 
 /// The colour of a material, or of the robot's material of that name.
-fn color_of(
-    material: Option<&urdf_rs::Material>,
-    materials: &[urdf_rs::Material],
-) -> Option<[f32; 4]> {
+fn color_of(material: Option<&MaterialValues>, materials: &[MaterialValues]) -> Option<[f32; 4]> {
     let material = material?;
     let shared = || {
         let named = materials.iter().rev();
         let mut colors = named.filter(|each| each.name == material.name);
-        colors.find_map(|each| each.color.as_ref())
+        colors.find_map(|each| each.rgba)
     };
-    let color = material.color.as_ref().or_else(shared)?;
     #[expect(clippy::cast_possible_truncation, reason = "colours need no more")]
-    Some(color.rgba.0.map(|value| value as f32))
+    let rgba = material.rgba.or_else(shared)?.map(|value| value as f32);
+    Some(rgba)
 }

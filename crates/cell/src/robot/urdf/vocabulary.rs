@@ -1,6 +1,6 @@
 //! What may stand in a URDF: elements, their attributes, and what is read of them.
 //!
-//! `urdf-rs` passes over what it does not know, so that `<orign>` or `<origin xy="1 2 3">` would be an
+//! Readers of URDFs pass over what they do not know, so that `<orign>` or `<origin xy="1 2 3">` would be an
 //! origin at zero. Everything that is not in here is refused, or said in a note where it may belong to
 //! another program.
 
@@ -209,16 +209,18 @@ static JOINT: Kind = Kind {
         child("child", Count::One, &LINK_NAME),
         child("axis", Count::Optional, &AXIS),
         child("limit", Count::Optional, &LIMIT),
+        child("safety_controller", Count::Optional, &SAFETY),
     ],
-    passed_over: &[
-        "calibration",
-        "dynamics",
-        "gazebo",
-        "mimic",
-        "safety_controller",
-    ],
+    passed_over: &["calibration", "dynamics", "gazebo", "mimic"],
     open: true,
 };
+
+static SAFETY: Kind = leaf(&[
+    optional("soft_lower_limit", Form::Plausible(1, &LIMIT_RAD)),
+    optional("soft_upper_limit", Form::Plausible(1, &LIMIT_RAD)),
+    optional("k_position", Form::Number),
+    required("k_velocity", Form::Number),
+]);
 
 static ORIGIN: Kind = leaf(&[
     optional("xyz", Form::Plausible(3, &PLACE)),
@@ -244,8 +246,8 @@ static INERTIAL: Kind = Kind {
     attributes: &[],
     children: &[
         child("origin", Count::Optional, &ORIGIN),
-        child("mass", Count::One, &MASS),
-        child("inertia", Count::One, &INERTIA),
+        child("mass", Count::Optional, &MASS),
+        child("inertia", Count::Optional, &INERTIA),
     ],
     passed_over: &[],
     open: false,
