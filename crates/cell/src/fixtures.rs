@@ -28,6 +28,8 @@ pub enum FixtureKind {
     Mount,
     /// One of the scenario's obstacles.
     Obstacle,
+    /// Somebody who stands in the room.
+    Person,
 }
 
 /// One rigid thing that does not move.

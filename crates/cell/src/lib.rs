@@ -72,7 +72,7 @@ pub use marker_list::{ListedMarker, MarkerFrame, MarkerList, marker_list_schema}
 pub use model::{
     AppliedCalibration, ArmInUse, ArmReport, BodyKind, BodyPair, Cell, ClearanceClass,
     CollisionBody, Frame, LeftOut, Link, LinkMember, Needle, NeedleCorridor, PairRule, Robot, Tool,
-    pair_rule, place_in_chain,
+    UnseenPart, WITHOUT_SHAPE, pair_rule, place_in_chain,
 };
 pub use printable::{printable, printable_json, printable_line};
 pub use resolve::{

@@ -77,13 +77,14 @@ pub fn pair_in_words(pair: &[String; 2]) -> String {
 }
 
 /// Rules that reject configurations, and what a configuration that one rejects suffers from.
-const RULES: [(&str, &str); 12] = [
+const RULES: [(&str, &str); 13] = [
     ("needle_route", "needle route blocked"),
     ("unreachable", "out of reach"),
     ("merged", "same as another"),
     ("joint_limit", "joint limit"),
     ("singular", "singular"),
     ("collision", "collision"),
+    ("too_close", "too close"),
     ("needle_corridor", "guide blocked"),
     ("approach", "no approach"),
     ("nearest_only", "not exact"),
@@ -106,6 +107,7 @@ fn class_in_words(class: ClearanceClass) -> [&'static str; 2] {
         ClearanceClass::RobotGantry => ["arm", "gantry"],
         ClearanceClass::RobotMount => ["arm", "mount"],
         ClearanceClass::RobotObstacle => ["arm", "obstacle"],
+        ClearanceClass::RobotPerson => ["arm", "person"],
         ClearanceClass::SelfCollision => ["arm", "itself"],
         ClearanceClass::ToolPhantom => ["tool", "patient"],
         ClearanceClass::GuideStandoff => ["guide", "skin"],
@@ -114,8 +116,8 @@ fn class_in_words(class: ClearanceClass) -> [&'static str; 2] {
     }
 }
 
-/// Why a configuration does not work, as rows of studies name it, in words: `collision robot_mount` is `arm hits
-/// mount`.
+/// Why a configuration does not work, as rows of studies name it, in words: `collision robot_mount` is `arm
+/// collides with mount`.
 pub fn reason_in_words(detail: &str) -> String {
     if RULES.iter().any(|(name, _)| *name == detail) {
         return rule_in_words(detail).to_owned();
@@ -125,9 +127,10 @@ pub fn reason_in_words(detail: &str) -> String {
         let [this, other] = class_in_words(class);
         Some(format!("{this} {words} {other}"))
     };
-    of_class("collision ", "hits")
-        .or_else(|| of_class("no_motion ", "cannot get past"))
-        .or_else(|| of_class("min_clearance_mm.", "too near"))
+    of_class("collision ", "collides with")
+        .or_else(|| of_class("too_close ", "too close to"))
+        .or_else(|| of_class("no_motion ", "blocked by"))
+        .or_else(|| of_class("min_clearance_mm.", "too close to"))
         // A key of the scenario stays one, for layouts that cannot exist.
         .unwrap_or_else(|| {
             if detail.contains('.') {
@@ -219,10 +222,11 @@ mod tests {
     #[test]
     fn details_are_said_in_words_and_what_is_not_known_stays() {
         for (detail, words) in [
-            ("collision robot_mount", "arm hits mount"),
-            ("collision self", "arm hits itself"),
-            ("no_motion robot_table", "arm cannot get past table"),
-            ("min_clearance_mm.robot_phantom", "arm too near patient"),
+            ("collision robot_mount", "arm collides with mount"),
+            ("collision self", "arm collides with itself"),
+            ("too_close robot_mount", "arm too close to mount"),
+            ("no_motion robot_table", "arm blocked by table"),
+            ("min_clearance_mm.robot_phantom", "arm too close to patient"),
             ("unreachable", "out of reach"),
             ("phantom.position_mm", "phantom.position_mm"),
             ("max_peak_torque_ratio", "max peak torque ratio"),

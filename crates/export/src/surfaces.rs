@@ -144,6 +144,7 @@ impl Surfaces {
             FixtureKind::Gantry => "gantry",
             FixtureKind::Mount => "mount",
             FixtureKind::Obstacle => "obstacle",
+            FixtureKind::Person => "person",
         };
         for (color_rgba, solids) in fixture.by_color() {
             let solids: Vec<TriangleMesh> = solids

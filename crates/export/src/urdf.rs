@@ -406,6 +406,7 @@ fn color(kind: BodyKind) -> [f32; 4] {
         BodyKind::Gantry => [0.9, 0.9, 0.88, 1.0],
         BodyKind::Mount => [0.55, 0.55, 0.58, 1.0],
         _ => [0.6, 0.55, 0.45, 1.0],
+        BodyKind::Person => [0.35, 0.45, 0.65, 0.35],
     }
 }
 

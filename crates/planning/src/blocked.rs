@@ -5,6 +5,7 @@ use needlebench_kinematics::trajectory::LineError;
 
 use crate::motion_plan::{Required, SearchEffort, Way};
 use crate::planner::Planner;
+use crate::rejection::of_distance;
 use crate::{Rejection, Rule};
 
 impl Planner<'_> {
@@ -19,13 +20,14 @@ impl Planner<'_> {
     ) -> Option<Rejection> {
         if let Some(pair) = self.checker.posture(self.start(), &mut Nearby::default()).1 {
             let [a, b] = pair.in_words(self.cell());
+            let (rule, does) = of_distance(pair.separation.distance_m);
             return Some(Rejection {
-                rule: Rule::Collision,
+                rule,
                 value: pair.separation.distance_m,
                 limit: self.limits().get(pair.class).floor_m,
                 unit: "m",
                 detail: format!(
-                    "{a} and {b} in the start posture: every motion begins there; another start would \
+                    "{a} {does} {b} in the start posture: every motion begins there; another start would \
                      free it"
                 ),
                 class: Some(pair.class),
@@ -34,15 +36,14 @@ impl Planner<'_> {
         if let Some(found) = self.deepest(approach) {
             let [a, b] = found.attained.in_words(self.cell());
             let class = found.attained.class;
+            let (rule, does, value) = Self::broken(found);
             return Some(Rejection {
-                rule: Rule::Collision,
-                value: found
-                    .lower_bound_m
-                    .min(found.attained.separation.distance_m),
+                rule,
+                value,
                 limit: self.limits().get(class).floor_m,
                 unit: "m",
                 detail: format!(
-                    "{a} and {b} in the {} at {:.2} s, at their nearest: the way along the needle, which no \
+                    "{a} {does} {b} in the {} at {:.2} s, at their nearest: the way along the needle, which no \
                      transfer changes; another roll, a shorter `approach_mm` or another base may free it",
                     found.phase.name(),
                     found.time_s
@@ -53,8 +54,9 @@ impl Planner<'_> {
         let found = self.deepest(&way.certificate)?;
         let [a, b] = found.attained.in_words(self.cell());
         let class = found.attained.class;
+        let (close, does, value) = Self::broken(found);
         let place = format!(
-            "{a} and {b} in the {} at {:.2} s, at their nearest",
+            "{a} {does} {b} in the {} at {:.2} s, at their nearest",
             found.phase.name(),
             found.time_s
         );
@@ -63,14 +65,14 @@ impl Planner<'_> {
             Some(effort) => (
                 Rule::NoMotion,
                 format!(
-                    "no way around was found among {} random postures ({} looked at); the straight \
-                     motion is blocked by {place}; start and approach keep {kept_mm:.1} mm there: more \
+                    "no way around was found among {} random postures ({} looked at), and on the straight \
+                     one {place}; start and approach keep {kept_mm:.1} mm there: more \
                      `motion_checks`, another start or another base may free it",
                     effort.samples, effort.checks
                 ),
             ),
             None => (
-                Rule::Collision,
+                close,
                 format!(
                     "{place}; start and approach keep {kept_mm:.1} mm: a way around (`motion_checks`) may \
                      free it"
@@ -79,14 +81,26 @@ impl Planner<'_> {
         };
         Some(Rejection {
             rule,
-            value: found
-                .lower_bound_m
-                .min(found.attained.separation.distance_m),
+            value,
             limit: self.limits().get(class).floor_m,
             unit: "m",
             detail,
             class: Some(class),
         })
+    }
+
+    /// Which rule a class breaks, what its two bodies do, in words, and the distance by which they do, m: the proven bound,
+    /// of bodies that were not seen to touch 0 at least.
+    fn broken(found: &ClassCertificate) -> (Rule, &'static str, f64) {
+        let attained_m = found.attained.separation.distance_m;
+        let (rule, does) = of_distance(attained_m);
+        let bound_m = found.lower_bound_m.min(attained_m);
+        let value_m = if attained_m < 0.0 {
+            bound_m
+        } else {
+            bound_m.max(0.0)
+        };
+        (rule, does, value_m)
     }
 
     /// The class that is farthest below its floor along a motion, if any is.

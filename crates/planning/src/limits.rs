@@ -86,6 +86,12 @@ impl ClassLimits {
                 // The guide tube is meant to stand near the skin: only touching counts.
                 ClearanceClass::GuideStandoff => (planning.min_clearance_mm * MM).min(0.0),
                 ClearanceClass::SelfCollision => planning.min_self_clearance_mm * MM,
+                ClearanceClass::RobotPerson => {
+                    planning
+                        .min_person_clearance_mm
+                        .max(planning.min_clearance_mm)
+                        * MM
+                }
                 ClearanceClass::NeedleCorridor if planning.require_needle_corridor => 0.0,
                 // Of the goal, whatever the posture.
                 ClearanceClass::NeedleCorridor | ClearanceClass::NeedleRoute => f64::NEG_INFINITY,

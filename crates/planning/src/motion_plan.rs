@@ -271,8 +271,10 @@ impl Planner<'_> {
     /// another rule rejects needs a motion only to be simulated.
     fn is_worth_a_search(&self, required: &Required) -> bool {
         let mut rejections = required.rejections.iter();
-        let is_wanted = rejections
-            .all(|each| self.planning().simulate_rejected && each.rule != Rule::Collision);
+        let is_wanted = rejections.all(|each| {
+            self.planning().simulate_rejected
+                && !matches!(each.rule, Rule::Collision | Rule::TooClose)
+        });
         is_wanted && required.attainable().most_below(&self.limits().floors()) <= 0.0
     }
 

@@ -337,7 +337,7 @@ impl Planner<'_> {
         };
         let others = match first.rule {
             Rule::Unreachable => "another place of the base may reach it",
-            Rule::Collision => "another base, tool or limit may free it",
+            Rule::Collision | Rule::TooClose => "another base, tool or limit may free it",
             Rule::NeedleCorridor => "another base or tool may free it",
             Rule::Singular | Rule::JointLimit | Rule::Approach => "another base may free it",
             Rule::NeedleRoute | Rule::Merged | Rule::NearestOnly | Rule::NoMotion => return,

@@ -10,6 +10,7 @@ use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, P
 
 use crate::limits::{ByClass, ClassLimits};
 use crate::motion::MotionChecker;
+use crate::rejection::of_distance;
 use crate::{Rejection, Rule};
 /// Where a final posture stands between its limits and singularities.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -300,14 +301,15 @@ impl<'a> Planner<'a> {
         let mut rejections = Vec::new();
         let (clearance, collision) = self.checker.posture(q, nearby);
         if let Some(pair) = collision {
+            let (rule, does) = of_distance(pair.separation.distance_m);
             rejections.push(Rejection {
-                rule: Rule::Collision,
+                rule,
                 value: pair.separation.distance_m,
                 limit: self.checker.limit_m(pair.class),
                 unit: "m",
                 detail: {
                     let [a, b] = pair.in_words(&self.resolved.cell);
-                    format!("{a} and {b} in the final posture")
+                    format!("{a} {does} {b} in the final posture")
                 },
                 class: Some(pair.class),
             });

@@ -17,8 +17,10 @@ pub enum Rule {
     JointLimit,
     /// The final posture is too near to a singularity.
     Singular,
-    /// Bodies touch or come nearer than allowed.
+    /// Bodies touch: the distance between them is below zero.
     Collision,
+    /// Bodies do not touch, but come nearer than the floor of their class, or it cannot be proven that they do not.
+    TooClose,
     /// The volume behind the guide that needle and hand need is blocked.
     NeedleCorridor,
     /// The guide cannot move straight along the needle to its place.
@@ -38,6 +40,7 @@ impl Rule {
             Self::JointLimit => "joint_limit",
             Self::Singular => "singular",
             Self::Collision => "collision",
+            Self::TooClose => "too_close",
             Self::NeedleCorridor => "needle_corridor",
             Self::Approach => "approach",
             Self::NoMotion => "no_motion",
@@ -60,4 +63,14 @@ pub struct Rejection {
     pub detail: String,
     /// Class of the pair, for collisions.
     pub class: Option<ClearanceClass>,
+}
+
+/// Which rule two bodies break whose distance is below their floor, and what they do, in words: `collides with` or
+/// `is too close to`.
+pub(crate) fn of_distance(distance_m: f64) -> (Rule, &'static str) {
+    if distance_m < 0.0 {
+        (Rule::Collision, "collides with")
+    } else {
+        (Rule::TooClose, "is too close to")
+    }
 }

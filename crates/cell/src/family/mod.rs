@@ -31,11 +31,34 @@ pub struct ScenarioFamily {
     library: ModelLibrary,
 }
 
+/// Refuses a cell of which not all is seen: cases that come out of it would say what nobody knows.
+fn all_seen(resolved: &ResolvedScenario) -> Result<(), Vec<Finding>> {
+    let mut names: Vec<&str> = resolved
+        .cell
+        .unseen
+        .values()
+        .flatten()
+        .map(String::as_str)
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    if names.is_empty() {
+        return Ok(());
+    }
+    let message = format!("no collision shape is known of {}", names.join(", "));
+    Err(vec![
+        Finding::new(&resolved.cell.robot.source.file, message).hint(
+            "give the link a <collision>; for one that needs none, say so in the scenario: `shape.NAME = \"none\"` \
+             under [robot] or [tool]",
+        ),
+    ])
+}
+
 impl ScenarioFamily {
     /// Reads and resolves a scenario file.
     ///
     /// # Errors
-    /// As [`load_scenario`].
+    /// As [`load_scenario`], and parts without a shape, of whose clearance nothing is known.
     pub fn load(path: &Path, overrides: &Overrides) -> Result<Self, Vec<Finding>> {
         let base = load_scenario(path, overrides)?;
         Self::of(base, path.parent().unwrap_or(Path::new("")), overrides)
@@ -50,6 +73,7 @@ impl ScenarioFamily {
         folder: &Path,
         overrides: &Overrides,
     ) -> Result<Self, Vec<Finding>> {
+        all_seen(&base)?;
         let arm = base.cell.robot.arm.as_ref();
         let editable = Editable::new(base.scenario.clone(), arm)
             .map_err(|error| vec![Finding::new(&base.source.file, error)])?;
@@ -109,7 +133,7 @@ impl ScenarioFamily {
         let toml = TomlText::without_text(file);
         let resolved = |scenario: Scenario, with_goals: bool| {
             let source = self.base.source.clone();
-            resolve(
+            let made = resolve(
                 &toml,
                 scenario,
                 source,
@@ -117,7 +141,9 @@ impl ScenarioFamily {
                 &self.overrides,
                 &self.library,
                 with_goals,
-            )
+            )?;
+            all_seen(&made)?;
+            Ok::<_, Vec<Finding>>(made)
         };
         let mut scenario = scenario;
         let Some(chooser) = self.overrides.choose_entry else {

@@ -1,5 +1,6 @@
 //! The resolved cell: robot, tool and everything that can be hit.
 
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -40,6 +41,22 @@ pub struct LinkMember {
     pub owner: usize,
     /// Whether it has collision geometry.
     pub has_geometry: bool,
+    /// Whether it has surfaces for pictures.
+    pub is_drawn: bool,
+    /// Whether it is the base or a moving link itself, and not bolted to one.
+    pub is_links_own: bool,
+}
+
+/// Beginning of the note on parts that have no shape because the scenario says so.
+pub const WITHOUT_SHAPE: &str = "without a shape, as the scenario says: ";
+
+/// A part of arm or tool that has no collision shape though it is there: nothing is known of its clearance.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnseenPart {
+    /// A link's label, or the name of a link in a URDF.
+    pub name: String,
+    /// The body that it belongs to: 0 for the base, 1 to 6 for the moving links; none for the tool.
+    pub owner: Option<usize>,
 }
 
 /// A calibration that a robot's chain was made from.
@@ -66,6 +83,8 @@ pub struct Robot {
     pub links: [Link; JOINT_COUNT],
     /// Links of the URDF and what they became part of, in the file's order.
     pub members: Vec<LinkMember>,
+    /// Parts that have no collision shape, and of which nobody says that they need none.
+    pub unseen: Vec<UnseenPart>,
     /// Mass properties of the moving links, without the tool.
     pub bodies: [Body; JOINT_COUNT],
     /// Limits of the joints.
@@ -142,6 +161,8 @@ pub struct Tool {
     pub solids: Vec<Solid>,
     /// Collision geometry of the guide tube, whose gap to the skin is intended.
     pub guide_solids: Vec<Solid>,
+    /// Links that are drawn or have mass, and no collision shape.
+    pub unseen: Vec<UnseenPart>,
     /// Surfaces for pictures.
     pub visuals: Vec<Visual>,
     /// Mass properties of the whole tool.
@@ -191,6 +212,8 @@ pub enum BodyKind {
     Mount,
     /// One of the scenario's obstacles.
     Obstacle,
+    /// Somebody who stands in the room.
+    Person,
 }
 
 /// What a collision body moves with.
@@ -231,6 +254,8 @@ pub enum ClearanceClass {
     RobotMount,
     /// Links and tool against the scenario's obstacles.
     RobotObstacle,
+    /// Links and tool against the people in the room.
+    RobotPerson,
     /// The arm and its tool against themselves.
     #[serde(rename = "self")]
     SelfCollision,
@@ -246,12 +271,13 @@ pub enum ClearanceClass {
 
 impl ClearanceClass {
     /// All of them, in the order of reports; each at the index that it is cast to.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::RobotPhantom,
         Self::RobotTable,
         Self::RobotGantry,
         Self::RobotMount,
         Self::RobotObstacle,
+        Self::RobotPerson,
         Self::SelfCollision,
         Self::ToolPhantom,
         Self::GuideStandoff,
@@ -272,6 +298,7 @@ impl ClearanceClass {
             Self::RobotGantry => "robot_gantry",
             Self::RobotMount => "robot_mount",
             Self::RobotObstacle => "robot_obstacle",
+            Self::RobotPerson => "robot_person",
             Self::SelfCollision => "self",
             Self::ToolPhantom => "tool_phantom",
             Self::GuideStandoff => "guide_standoff",
@@ -323,6 +350,9 @@ pub struct Cell {
     pub bodies: Vec<CollisionBody>,
     /// The pairs that are checked; adjacent links and what is bolted together are left out.
     pub pairs: Vec<BodyPair>,
+    /// Classes of which not all bodies have a shape, and the parts that have none: nothing is known of the least
+    /// clearance there.
+    pub unseen: BTreeMap<ClearanceClass, Vec<String>>,
 }
 
 /// Volume behind the guide entry that has to stay free: a cylinder about the guide axis, and a cone
@@ -434,6 +464,32 @@ impl Cell {
         bodies.extend(surroundings);
         bodies.retain(|body| !body.solids.is_empty());
 
+        let mut unseen: BTreeMap<ClearanceClass, Vec<String>> = BTreeMap::new();
+        for part in robot.unseen.iter().chain(&tool.unseen) {
+            let (kind, frame) = match part.owner {
+                Some(0) => (BodyKind::Base, Frame::World),
+                Some(link) => (BodyKind::Link, Frame::Link(link - 1)),
+                None => (BodyKind::Tool, wrist_3),
+            };
+            let body = CollisionBody {
+                name: part.name.clone(),
+                kind,
+                frame,
+                solids: Vec::new(),
+            };
+            for other in &bodies {
+                if let PairRule::Measured(class) = pair_rule(&body, other) {
+                    let names = unseen.entry(class).or_default();
+                    if names.last() != Some(&part.name) {
+                        names.push(part.name.clone());
+                    }
+                }
+            }
+        }
+        for names in unseen.values_mut() {
+            names.dedup();
+        }
+
         let mut pairs = Vec::new();
         for a in 0..bodies.len() {
             for b in a + 1..bodies.len() {
@@ -455,6 +511,7 @@ impl Cell {
             armature_kgm2,
             bodies,
             pairs,
+            unseen,
         }
     }
 

@@ -10,6 +10,8 @@ pub enum LeftOut {
     Fixed,
     /// They share a joint, so that they touch by design.
     Adjacent,
+    /// The hand that belongs there is a person's.
+    Hand,
 }
 
 /// What becomes of a pair of bodies.
@@ -28,7 +30,8 @@ pub enum PairRule {
 /// wrist stands behind its guide shows that as a constant.
 pub fn pair_rule(a: &CollisionBody, b: &CollisionBody) -> PairRule {
     use BodyKind::{
-        Base, Gantry, GuideTube, Link, Mount, NeedleCorridor, Obstacle, Phantom, Table, Tool,
+        Base, Gantry, GuideTube, Link, Mount, NeedleCorridor, Obstacle, Person, Phantom, Table,
+        Tool,
     };
     let (first, second) = if a.kind <= b.kind { (a, b) } else { (b, a) };
     let wrist_behind_guide = second.kind == NeedleCorridor && first.kind == Link;
@@ -43,6 +46,7 @@ pub fn pair_rule(a: &CollisionBody, b: &CollisionBody) -> PairRule {
             ClearanceClass::SelfCollision
         }
         (Base | Link, Tool | GuideTube) => ClearanceClass::SelfCollision,
+        (NeedleCorridor, Person) => return PairRule::LeftOut(LeftOut::Hand),
         (_, NeedleCorridor) | (NeedleCorridor, Phantom | Table | Gantry | Mount | Obstacle) => {
             ClearanceClass::NeedleCorridor
         }
@@ -53,6 +57,7 @@ pub fn pair_rule(a: &CollisionBody, b: &CollisionBody) -> PairRule {
         (Link | Tool | GuideTube, Gantry) => ClearanceClass::RobotGantry,
         (Link | Tool | GuideTube, Mount) => ClearanceClass::RobotMount,
         (Link | Tool | GuideTube, Obstacle) => ClearanceClass::RobotObstacle,
+        (Link | Tool | GuideTube, Person) => ClearanceClass::RobotPerson,
         // Two parts of the tool, or two that stand still: they share a frame.
         _ => return PairRule::LeftOut(LeftOut::Fixed),
     })

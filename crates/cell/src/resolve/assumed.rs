@@ -49,7 +49,8 @@ pub(super) fn assume(
             data.cell.as_ref()?.beside_patient_mm
         });
         if let Some(beside_mm) = known {
-            assume_place(toml, scenario, beside_mm, notes);
+            assume_place(scenario, beside_mm, notes);
+            assume_tool(toml, scenario, notes);
         }
     }
 }
@@ -118,7 +119,6 @@ fn assume_table(scenario: &mut Scenario, notes: &mut Vec<String>) {
 /// A robot at the patient's right, where the scenario says nothing of its place. In the middle of the room, its
 /// general place, it would stand in the patient.
 fn assume_place(
-    toml: &TomlText<'_>,
     scenario: &mut Scenario,
     [along_mm, beside_mm, over_mm]: [f64; 3],
     notes: &mut Vec<String>,
@@ -145,24 +145,29 @@ fn assume_place(
     ];
     robot.base_position_mm = Some(place_mm);
     robot.base_rpy_deg = Some([0.0, 0.0, FACING_DEG]);
+    // In all digits: what is copied from the screen is the same place.
     let [x, y, z] = place_mm;
     let mut what = format!(
-        "it stands at the patient's right, `base_position_mm = [{x:.0}, {y:.0}, {z:.0}]` and `base_rpy_deg = \
-         [0, 0, {FACING_DEG:.0}]`"
+        "it stands at the patient's right, `base_position_mm = [{x}, {y}, {z}]` and `base_rpy_deg = \
+         [0, 0, {FACING_DEG}]`"
     );
     if scenario.mount.is_none() {
         scenario.mount = Some(MountSection::default());
-        what += ", on a column ([mount])";
+        what += ", on a column, `[mount]`, which is written down with it";
     }
     notes.push(format!(
         "assumed, since [robot] does not say where the robot stands: {what}"
     ));
+}
+
+/// The tool, where the scenario says nothing of it: the same whether the robot's place is assumed or written down.
+fn assume_tool(toml: &TomlText<'_>, scenario: &mut Scenario, notes: &mut Vec<String>) {
     if toml.span_of("tool").is_none() {
         let (urdf, length_mm) = TOOL;
         urdf.clone_into(&mut scenario.tool.urdf);
         scenario.tool.needle_length_mm = Some(length_mm);
         notes.push(format!(
-            "assumed, since there is no [tool]: the guide `{urdf}` with a needle of {length_mm:.0} mm"
+            "assumed, since there is no [tool]: the guide `urdf = \"{urdf}\"` with a needle of `needle_length_mm = {length_mm}`"
         ));
     }
 }

@@ -1,6 +1,7 @@
 //! The models that scenarios name: read from files, built, and kept for the next scenario that names
 //! the same.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -17,11 +18,11 @@ use super::robot::scenario_robot;
 use super::tool::{UnmountedTool, scenario_tool, tool_overrides};
 use crate::files::ModelSource;
 use crate::fixtures::{self, Fixture, FixtureError};
-use crate::robot::MissingInertia;
 use crate::robot::ToolOverrides;
+use crate::robot::{MissingInertia, StatedShape};
 use crate::scenario::{
     CalibrationBlock, GantrySection, MountKind, MountSection, ObstacleSection, ObstacleShape,
-    PartSection, PhantomSection, RobotSection, Scenario, TableSection,
+    PartSection, PhantomSection, RobotSection, Scenario, TableSection, ToolSection,
 };
 use crate::toml_text::TomlText;
 use crate::{Finding, Robot, Tool};
@@ -50,7 +51,7 @@ fn sizes_mm(section: &PhantomSection) -> [Option<f64>; 3] {
 #[derive(Debug, Default)]
 pub(crate) struct ModelLibrary {
     robots: Cache<RobotKey, Robot>,
-    tools: Cache<(String, ToolOverrides), UnmountedTool>,
+    tools: Cache<(String, ToolOverrides, BTreeMap<String, StatedShape>), UnmountedTool>,
     phantoms: Cache<PhantomKey, UnplacedPhantom>,
     tables: Cache<TableSection, Fixture>,
     gantries: Cache<GantrySection, Fixture>,
@@ -75,8 +76,10 @@ struct AbsorbedKey {
 struct RobotKey {
     urdf: Option<String>,
     arm: Option<String>,
+    prefix: Option<String>,
     missing_inertia: MissingInertia,
     calibration: Option<String>,
+    shape: BTreeMap<String, StatedShape>,
 }
 
 impl ModelLibrary {
@@ -91,8 +94,10 @@ impl ModelLibrary {
         let key = RobotKey {
             urdf: section.urdf.clone(),
             arm: section.arm.clone(),
+            prefix: section.prefix.clone(),
             missing_inertia: section.missing_inertia.clone(),
             calibration: section.calibration.clone(),
+            shape: section.shape.clone(),
         };
         self.robots.get(
             |known| *known == key,
@@ -112,12 +117,12 @@ impl ModelLibrary {
         overrides: &Overrides,
     ) -> Result<Arc<UnmountedTool>, Finding> {
         let wanted = tool_overrides(toml, scenario)?;
-        let urdf = &scenario.tool.urdf;
+        let ToolSection { urdf, shape, .. } = &scenario.tool;
         self.tools.get(
-            |(known, with)| known == urdf && *with == wanted,
+            |(known, with, stated)| known == urdf && *with == wanted && stated == shape,
             || {
                 let part = scenario_tool(toml, scenario, &wanted, base, overrides)?;
-                Ok(((urdf.clone(), wanted), part))
+                Ok(((urdf.clone(), wanted, shape.clone()), part))
             },
         )
     }

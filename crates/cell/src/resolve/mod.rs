@@ -495,10 +495,17 @@ pub(crate) fn resolve(
             phantom: phantom.as_ref(),
             solids: &solids,
             robot_base_m: Point3::from(world_from_base_link.translation.vector),
+            needle_m: tool.needle.length_m,
         };
         resolve_people(toml, &scenario.people, &goals, &room).map_err(one)?
     };
     note_crowds(&people, &goals, &mut notes);
+    if !scenario.people.persons.is_empty() {
+        for (name, solids) in people.bodies(&goals) {
+            fixtures.push(people::drawn(solids.clone()));
+            surroundings.push(static_body(&name, BodyKind::Person, solids));
+        }
+    }
     if let Some(joint) = robot.limits.first_violation(&start) {
         let limit = robot.limits.0[joint];
         return Err(one(toml.finding(

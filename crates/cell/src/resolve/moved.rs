@@ -72,7 +72,12 @@ impl StillLayout {
             .bodies
             .iter()
             .filter(|body| body.frame == Frame::World)
-            .filter(|body| !matches!(body.kind, BodyKind::Base | BodyKind::Phantom))
+            .filter(|body| {
+                !matches!(
+                    body.kind,
+                    BodyKind::Base | BodyKind::Phantom | BodyKind::Person
+                )
+            })
             .cloned()
             .collect();
         let boxes: Vec<BodyBoxes> = others.iter().map(BodyBoxes::new).collect();
@@ -110,6 +115,9 @@ impl StillLayout {
         &self,
         section: &PhantomSection,
     ) -> Result<Option<(PlacedPhantom, Goal)>, Vec<Finding>> {
+        if self.people_are_bodies() {
+            return Ok(None);
+        }
         let one = |finding: Finding| vec![finding];
         let (scenario, cell) = (&self.resolved.scenario, &self.resolved.cell);
         let toml = TomlText::without_text(&self.resolved.source.file);
@@ -155,14 +163,21 @@ impl StillLayout {
 }
 
 impl StillLayout {
-    /// Whether the patient's limbs lie beside the chest as in the layout: they may not where the chest is
-    /// turned on what it rests on.
+    /// Whether there are people to keep away from: they stand and face where the goal is, which moves with the phantom.
+    fn people_are_bodies(&self) -> bool {
+        !self.resolved.scenario.people.persons.is_empty()
+    }
+
+    /// Whether nothing but the patient is elsewhere, and the patient's limbs lie beside the chest as in the layout: they
+    /// may not where the chest is turned on what it rests on.
     pub(crate) fn lies_alike(&self, placed: &PlacedPhantom) -> bool {
         /// More than the rounding of a place, m and rad.
         const SAME: f64 = 1e-9;
         let known = self.resolved.phantom.as_ref();
+        let stand_still = !self.people_are_bodies();
         known.is_some_and(|known| {
-            known.limbs.len() == placed.limbs.len()
+            stand_still
+                && known.limbs.len() == placed.limbs.len()
                 && known.limbs.iter().zip(&placed.limbs).all(|(known, here)| {
                     let [known, here] = [known, here].map(|limb| limb.solid.parent_from_shape);
                     let between = known.inverse() * here;

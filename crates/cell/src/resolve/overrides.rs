@@ -17,6 +17,8 @@ pub struct Overrides {
     /// The arm whose data the robot has: the name of a shipped one, or the path of an `arm.toml`
     /// relative to the working directory. Without a URDF it is the robot too.
     pub arm: Option<String>,
+    /// What stands before the names of the arm's links and joints in its URDF.
+    pub prefix: Option<String>,
     /// Search paths for `package://`.
     pub packages: PackagePaths,
     /// Factory calibration whose joint origins replace the URDF's, relative to the working

@@ -1,5 +1,6 @@
 //! The robot of a scenario, or of the command line alone.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -28,7 +29,9 @@ pub fn load_robot(overrides: &Overrides) -> Result<Robot, Finding> {
         &policy,
         Pose::identity(),
         arm.as_ref(),
+        overrides.prefix.as_deref(),
     )?;
+    robot.complete_shapes(&BTreeMap::new())?;
     calibrate(&mut robot, overrides)?;
     calibrate_by_data(&mut robot)?;
     Ok(robot)
@@ -73,12 +76,19 @@ pub(super) fn scenario_robot(
 ) -> Result<Robot, Finding> {
     let (arm, location) = arm_and_urdf(toml, section, base, overrides)?;
     let policy = overrides.missing_inertia.as_ref();
+    // The scenario's prefix is that of the scenario's robot.
+    let own = section
+        .prefix
+        .as_deref()
+        .filter(|_| !overrides.replace_robot());
+    let prefix = overrides.prefix.as_deref().or(own);
     let mut robot = read_robot(
         &location,
         &overrides.packages,
         policy.unwrap_or(&section.missing_inertia),
         Pose::identity(),
         arm.as_ref(),
+        prefix,
     )
     .map_err(|finding| {
         // The command line's robot is not the one that the scenario names.
@@ -89,6 +99,17 @@ pub(super) fn scenario_robot(
             with_model_names(toml, finding, &location, "robot.urdf", &names)
         }
     })?;
+    // What the scenario says of links is of its own robot.
+    if overrides.replace_robot() {
+        robot.complete_shapes(&BTreeMap::new())?;
+    } else {
+        robot
+            .complete_shapes(&section.shape)
+            .map_err(|finding| Finding {
+                hint: finding.hint,
+                ..toml.finding("robot.shape", finding.message)
+            })?;
+    }
     calibrate(&mut robot, overrides)?;
     // The scenario's calibration is that of the scenario's robot.
     if let Some(reference) = &section.calibration

@@ -6,7 +6,7 @@ use super::names::with_model_names;
 use super::overrides::Overrides;
 use crate::Finding;
 use crate::files::Location;
-use crate::model::Tool;
+use crate::model::{Tool, WITHOUT_SHAPE};
 use crate::robot::{GuidePlace, ToolOverrides, read_tool};
 use crate::scenario::{NEEDLE_OUTER_DIAMETER_MM, PARAMETRIC_TOOL, Scenario, ToolSection};
 use crate::toml_text::TomlText;
@@ -32,7 +32,7 @@ pub(super) fn scenario_tool(
         Location::of_model(urdf, "needle_guide", "urdf", base)
     };
     let mut notes = Vec::new();
-    let tool =
+    let mut tool =
         read_tool(&location, &overrides.packages, wanted, &mut notes).map_err(|finding| {
             // A bore or a gauge of the scenario may not fit the tool's other half.
             let given = [
@@ -53,6 +53,19 @@ pub(super) fn scenario_tool(
                 }
             }
         })?;
+    let stated = &scenario.tool.shape;
+    if let Some(unknown) = stated
+        .keys()
+        .find(|name| !tool.unseen.iter().any(|part| part.name == **name))
+    {
+        let message = format!("the tool has no link `{unknown}` that lacks a collision shape");
+        return Err(toml.finding("tool.shape", message));
+    }
+    tool.unseen.retain(|part| !stated.contains_key(&part.name));
+    if !stated.is_empty() {
+        let names: Vec<&str> = stated.keys().map(String::as_str).collect();
+        notes.push(format!("{WITHOUT_SHAPE}{}", names.join(", ")));
+    }
     Ok(UnmountedTool { tool, notes })
 }
 

@@ -16,7 +16,7 @@ const SAMPLES: f64 = 20_000.0;
 const FINER: f64 = 5.0;
 
 /// How far the tessellated primitives may be inside the true ones, m.
-const CHORD_ERROR_M: f64 = 1e-5;
+pub(super) const CHORD_ERROR_M: f64 = 1e-5;
 
 /// The shipped arm's primitives of one link beside the surface of the robot in use.
 ///
@@ -126,7 +126,7 @@ fn compare(link: &str, solids: &[Solid], primitives: &[Solid]) -> LinkEnclosure 
 }
 
 /// A solid's surface in the frame of its link.
-fn surface_in_parent(solid: &Solid) -> SurfaceIndex {
+pub(super) fn surface_in_parent(solid: &Solid) -> SurfaceIndex {
     let mut mesh = solid.shape.surface(CHORD_ERROR_M);
     for vertex in &mut mesh.vertices_m {
         *vertex = solid.parent_from_shape * *vertex;
@@ -135,7 +135,7 @@ fn surface_in_parent(solid: &Solid) -> SurfaceIndex {
 }
 
 /// Distance of a point of the link from a solid, m: negative inside. Exact for the primitives.
-fn signed_distance_m(solid: &Solid, point: &Point3<f64>) -> f64 {
+pub(super) fn signed_distance_m(solid: &Solid, point: &Point3<f64>) -> f64 {
     let local = solid.parent_from_shape.inverse() * point;
     // From the distances beyond a body's extents along independent directions.
     let beyond = |out: &[f64]| {

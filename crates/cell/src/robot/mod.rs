@@ -3,6 +3,7 @@
 mod arm_checks;
 mod calibration;
 mod enclosure;
+mod envelope;
 mod link_shape;
 mod missing_inertia;
 mod nominal;
@@ -16,7 +17,6 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use needlebench_geometry::mesh::read_stl;
 use needlebench_geometry::{Shape, Solid, TriangleMesh, Visual};
 use needlebench_kinematics::{
     Body, Chain, ChainJoint, JOINT_COUNT, JOINT_NAMES, JointLimits, Pose, UrGeometry,
@@ -24,11 +24,13 @@ use needlebench_kinematics::{
 
 use crate::arm::{Arm, Recognition, choose_arm, note_on_no_arm};
 use crate::files::{Location, ModelSource, source_of};
+use crate::mesh_file::{MeshFormat, read_mesh as read_mesh_file};
 use crate::model::{ArmInUse, LinkMember};
 use crate::{Finding, Link, PackagePaths, Robot, nearest_name};
 use arm_checks::{check_body, check_origin, joint_limit};
 pub use calibration::{Calibration, OriginDeviation};
 pub use enclosure::{LinkEnclosure, enclosures};
+pub use envelope::StatedShape;
 use link_shape::shape_of_link;
 pub use missing_inertia::MissingInertia;
 use nominal::{body_in_frame_of, nominal_robot, notes_on_limits};
@@ -57,9 +59,17 @@ pub(crate) fn read_robot(
     missing_inertia: &MissingInertia,
     world_from_base_link: Pose,
     named: Option<&Arc<Arm>>,
+    prefix: Option<&str>,
 ) -> Result<Robot, Finding> {
-    let urdf = read_urdf(location)?;
+    let mut urdf = read_urdf(location)?;
     let mut notes = urdf.notes.clone();
+    match prefix {
+        Some(prefix) => {
+            notes.push(take_prefix(&mut urdf, prefix)?);
+            notes.extend(hold_others(&mut urdf));
+        }
+        None => notes.extend(without_prefix(&mut urdf)?),
+    }
     let (joints, tip) = arm_joints(&urdf)?;
 
     // Fixed joints between two revolute ones are folded into the next joint's origin.
@@ -93,6 +103,7 @@ pub(crate) fn read_robot(
     })?;
 
     let limits = JointLimits(limits.try_into().expect("six limits"));
+    notes.extend(note_on_soft_limits(&joints));
     let arm = arm_in_use(named, location, packages, &geometry, &limits)?;
     match &arm {
         Some(used) => {
@@ -119,6 +130,9 @@ pub(crate) fn read_robot(
             name: link.name.clone(),
             owner: owner_of(&urdf, &joints, &link.name).0,
             has_geometry: !link.collisions.is_empty(),
+            is_drawn: !link.visuals.is_empty(),
+            is_links_own: link.name.starts_with("base")
+                || joints.iter().any(|joint| joint.child == link.name),
         })
         .collect();
     let mut links = Vec::with_capacity(JOINT_COUNT + 1);
@@ -161,6 +175,7 @@ pub(crate) fn read_robot(
         base,
         links: links.try_into().expect("six links"),
         members,
+        unseen: Vec::new(),
         bodies: bodies.try_into().expect("six bodies"),
         limits,
         arm,
@@ -205,6 +220,103 @@ pub(crate) fn read_urdf(location: &Location) -> Result<Urdf, Finding> {
     Urdf::parse(&file, &bytes)
 }
 
+/// Takes the prefix off the names of links and joints where the six joints have one in common, as ROS's description
+/// gives it (`tf_prefix`), and says so.
+///
+/// # Errors
+/// Several arms: somebody has to say which.
+fn without_prefix(urdf: &mut Urdf) -> Result<Option<String>, Finding> {
+    let prefixes = prefixes_of(urdf);
+    match prefixes.as_slice() {
+        [prefix] if !prefix.is_empty() => Ok(take_prefix(urdf, prefix).ok()),
+        [_, _, ..] => {
+            let quoted: Vec<String> = prefixes.iter().map(|it| format!("`{it}`")).collect();
+            let message = format!(
+                "it has {} UR arms, {}",
+                prefixes.len(),
+                quoted.join(" and ")
+            );
+            Err(Finding::new(&urdf.file, message).hint(
+                "say which is the robot: --prefix, or `prefix` under [robot]; the others stand still",
+            ))
+        }
+        _ => Ok(None),
+    }
+}
+
+/// What stands before the names of each UR arm's joints in the file; empty for one whose names are bare.
+fn prefixes_of(urdf: &Urdf) -> Vec<String> {
+    let has = |name: &str| urdf.joints.iter().any(|joint| joint.name == name);
+    let prefixes = urdf.joints.iter().filter_map(|joint| {
+        let prefix = joint.name.strip_suffix(JOINT_NAMES[0])?;
+        let whole = JOINT_NAMES
+            .iter()
+            .all(|name| has(&format!("{prefix}{name}")));
+        whole.then(|| prefix.to_owned())
+    });
+    prefixes.collect()
+}
+
+/// Takes a prefix off the names that have it.
+///
+/// # Errors
+/// A prefix of no arm, or names that are there without it too.
+fn take_prefix(urdf: &mut Urdf, prefix: &str) -> Result<String, Finding> {
+    let known = prefixes_of(urdf);
+    if !known.iter().any(|each| each == prefix) {
+        let known: Vec<String> = known.iter().map(|each| format!("`{each}`")).collect();
+        let message = format!("no UR arm in it has the prefix `{prefix}`");
+        let hint = if known.is_empty() {
+            format!("the joints of an arm are {}", JOINT_NAMES.join(", "))
+        } else {
+            format!("there is {}", known.join(" and "))
+        };
+        return Err(Finding::new(&urdf.file, message).key("prefix").hint(hint));
+    }
+    let of_joints = urdf
+        .joints
+        .iter()
+        .flat_map(|joint| [&joint.parent, &joint.child]);
+    let taken = |bare: &str| {
+        urdf.links.iter().any(|link| link.name == bare)
+            || urdf.joints.iter().any(|joint| joint.name == bare)
+    };
+    let names = urdf.links.iter().map(|link| &link.name).chain(of_joints);
+    let bare = |name: &'_ &String| name.strip_prefix(prefix).is_some_and(&taken);
+    if let Some(twice) = names.filter(|_| !prefix.is_empty()).find(bare) {
+        let message = format!("it has '{twice}' with and without the prefix `{prefix}`");
+        return Err(Finding::new(&urdf.file, message).key("prefix"));
+    }
+    for name in urdf.links.iter_mut().map(|link| &mut link.name).chain(
+        urdf.joints
+            .iter_mut()
+            .flat_map(|joint| [&mut joint.name, &mut joint.parent, &mut joint.child]),
+    ) {
+        if let Some(bare) = name.strip_prefix(prefix) {
+            *name = bare.to_owned();
+        }
+    }
+    Ok(format!("names are read without their prefix `{prefix}`"))
+}
+
+/// Makes the moving joints of others than the arm stand still at zero, and says so.
+fn hold_others(urdf: &mut Urdf) -> Option<String> {
+    let is_other = |joint: &&mut UrdfJoint| {
+        joint.kind != JointKind::Fixed && !JOINT_NAMES.contains(&joint.name.as_str())
+    };
+    let mut held = Vec::new();
+    for joint in urdf.joints.iter_mut().filter(is_other) {
+        joint.kind = JointKind::Fixed;
+        held.push(joint.name.clone());
+    }
+    (!held.is_empty()).then(|| {
+        format!(
+            "not of the arm, and taken to stand still at 0: {}",
+            held.join(", ")
+        )
+    })
+}
+
 /// The six joints in order, and the link that is the flange.
 fn arm_joints(urdf: &Urdf) -> Result<(Vec<&UrdfJoint>, String), Finding> {
     let names: Vec<&str> = urdf
@@ -217,6 +329,22 @@ fn arm_joints(urdf: &Urdf) -> Result<(Vec<&UrdfJoint>, String), Finding> {
         let Some(joint) = urdf.joints.iter().find(|joint| joint.name == expected) else {
             let finding = Finding::new(&urdf.file, format!("it has no joint '{expected}'"))
                 .key(format!("joint '{expected}'"));
+            let is_ur = |name: &&str| JOINT_NAMES.iter().any(|joint| name.ends_with(joint));
+            if !names.iter().any(is_ur) {
+                let moving = urdf
+                    .joints
+                    .iter()
+                    .filter(|joint| joint.kind != JointKind::Fixed);
+                let moving: Vec<&str> = moving.map(|joint| joint.name.as_str()).collect();
+                let message = match moving.as_slice() {
+                    [] => "it is no UR arm: none of its joints moves".to_owned(),
+                    all => format!("it is no UR arm: its moving joints are {}", all.join(", ")),
+                };
+                return Err(Finding::new(&urdf.file, message).hint(format!(
+                    "six-joint arms of Universal Robots are known, by ROS's names: {}",
+                    JOINT_NAMES.join(", ")
+                )));
+            }
             let prefixed = names.iter().copied().find(|name| name.ends_with(expected));
             let near = prefixed.or_else(|| nearest_name(expected, names.iter().copied()));
             return Err(match near {
@@ -344,6 +472,26 @@ fn no_inertia(
     finding
         .key(format!("link '{link}'"))
         .hint(format!("give it an <inertial>{}", policy.way_out(arm)))
+}
+
+/// Says of which joints the ranges are those of their safety controllers.
+fn note_on_soft_limits(joints: &[&UrdfJoint]) -> Option<String> {
+    let soft = joints.iter().filter(|joint| {
+        let limit = joint.limit.filter(|_| joint.kind == JointKind::Revolute);
+        let own = limit.map_or([f64::NEG_INFINITY, f64::INFINITY], |own| {
+            [own.lower, own.upper]
+        });
+        joint
+            .soft
+            .is_some_and(|soft| soft[0] > own[0] || soft[1] < own[1])
+    });
+    let names: Vec<&str> = soft.map(|joint| joint.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "soft limits of <safety_controller> narrow the range of {}",
+            names.join(", ")
+        )
+    })
 }
 
 /// Says that what stands above `base_link` in the file does not place the robot.
@@ -554,19 +702,18 @@ fn read_mesh(
         urdf.finding(span, format!("mesh `{filename}`: {why}"))
             .key("filename")
     })?;
-    if !filename.to_lowercase().ends_with(".stl") {
-        return Err(urdf
-            .finding(span, format!("mesh `{filename}` is not an STL file"))
-            .key("filename")
-            .hint("convert it to STL"));
-    }
-    let bytes = mesh_location.read().map_err(|error| {
-        urdf.finding(span, format!("mesh `{}`: {error}", mesh_location.display()))
-            .key("filename")
-            .hint("mesh files are looked for beside the URDF; package:// needs --package-path")
+    let refused = |why: String| {
+        let message = format!("mesh `{}`: {why}", mesh_location.display());
+        urdf.finding(span, message).key("filename")
+    };
+    let format = MeshFormat::of_name(filename).ok_or_else(|| {
+        let what = MeshFormat::other(filename).unwrap_or("no file of a mesh by its name");
+        refused(format!("it is {what}")).hint("STL, OBJ and COLLADA (.dae) are read: convert it")
     })?;
-    read_stl(&bytes, *scale).map_err(|why| {
-        urdf.finding(span, format!("mesh `{}`: {why}", mesh_location.display()))
-            .key("filename")
-    })
+    let bytes = mesh_location.read().map_err(|error| {
+        refused(error).hint(
+            "mesh files are looked for beside the URDF; package:// and model:// need --package-path",
+        )
+    })?;
+    read_mesh_file(&bytes, format, *scale).map_err(|why| refused(why.to_string()))
 }

@@ -7,6 +7,7 @@ use super::parametric::GuidePlace;
 use super::urdf::{JointKind, Urdf};
 use super::{read_solids, read_urdf, read_visuals, rename_unique, visual_of};
 use crate::files::{Location, source_of};
+use crate::model::UnseenPart;
 use crate::{Finding, Needle, PackagePaths, Tool};
 
 /// Agreement that is asked of numbers which a tool's URDF states twice.
@@ -103,10 +104,18 @@ pub(crate) fn read_tool(
 
     let mut body = Body::massless();
     let (mut solids, mut guide_solids, mut visuals) = (Vec::new(), Vec::new(), Vec::new());
+    let mut unseen = Vec::new();
     for link in &urdf.links {
         let pose = flange_from(&link.name);
         body = body.combined_with(&link.inertial.unwrap_or(Body::massless()).transformed(&pose));
         let read = read_solids(&urdf, location, packages, link, &pose, notes)?;
+        let is_there = !link.visuals.is_empty() || link.inertial.is_some();
+        if is_there && read.is_empty() && link.name != "guide_tube" {
+            unseen.push(UnseenPart {
+                name: link.name.clone(),
+                owner: None,
+            });
+        }
         if link.name == "guide_tube" {
             &mut guide_solids
         } else {
@@ -166,6 +175,7 @@ pub(crate) fn read_tool(
             .to_owned(),
         solids,
         guide_solids,
+        unseen,
         visuals,
         body,
         flange_from_guide_entry: entry,

@@ -34,6 +34,10 @@ pub struct ClearanceCriteria {
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 1000.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub robot_obstacle: Option<f64>,
+    /// Arm and tool against the people of `[[people.persons]]`, who stand still.
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1000.0), extend("x-off" = true, "x-unit" = "mm"))]
+    pub robot_person: Option<f64>,
     /// Arm and tool against themselves.
     #[serde(rename = "self", with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 100.0), extend("x-off" = true, "x-unit" = "mm"))]
@@ -65,6 +69,7 @@ impl ClearanceCriteria {
             ClearanceClass::RobotGantry => self.robot_gantry,
             ClearanceClass::RobotMount => self.robot_mount,
             ClearanceClass::RobotObstacle => self.robot_obstacle,
+            ClearanceClass::RobotPerson => self.robot_person,
             ClearanceClass::SelfCollision => self.self_collision,
             ClearanceClass::ToolPhantom => self.tool_phantom,
             ClearanceClass::GuideStandoff => self.guide_standoff,

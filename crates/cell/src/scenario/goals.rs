@@ -13,13 +13,14 @@ use crate::schema::{LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
 
 /// Rules that reject configurations: the words that `expected` may use.
-pub(crate) const REJECTION_RULES: [&str; 10] = [
+pub(crate) const REJECTION_RULES: [&str; 11] = [
     "needle_route",
     "unreachable",
     "merged",
     "joint_limit",
     "singular",
     "collision",
+    "too_close",
     "needle_corridor",
     "approach",
     "nearest_only",
@@ -110,7 +111,8 @@ pub struct GoalSection {
     /// Plans where the needle enters, by rules and risks, with the robot: instead of an entry.
     #[serde(default)]
     pub route: Option<RouteSection>,
-    /// Outcome that is expected of a configuration: `ok`, `failed`, or the rule that rejects it.
+    /// Outcome that is expected of a configuration: `ok`, `failed`, or the rule that rejects it; `collision` is also met
+    /// by `too_close`.
     /// The key `every` stands for all that are not named.
     #[serde(default)]
     #[schemars(schema_with = "outcomes")]

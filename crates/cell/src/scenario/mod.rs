@@ -195,6 +195,7 @@ impl Scenario {
             ClearanceClass::RobotGantry => ("[gantry]", self.gantry.is_some()),
             ClearanceClass::RobotMount => ("[mount]", self.mount.is_some()),
             ClearanceClass::RobotObstacle => ("[[obstacles]]", false),
+            ClearanceClass::RobotPerson => ("[[people.persons]]", !self.people.persons.is_empty()),
             ClearanceClass::SelfCollision | ClearanceClass::NeedleCorridor => return None,
         };
         let counts = |each: &ObstacleSection| each.present && each.class.class() == class;

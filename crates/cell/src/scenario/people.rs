@@ -119,7 +119,10 @@ impl StaturePercentile {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PeopleSection {
-    /// Who stands where. Left out: one doctor across the patient from the robot, in three statures.
+    /// Who stands where. Each is a body that arm and tool keep away from (`robot_person`): it stands still, upright,
+    /// 300 mm deep and 500 mm wide, facing the entry point, as tall as its tallest stature; where the place follows from the
+    /// goal, at its places for all goals. Left out: one doctor across the patient from the robot, in three statures, of
+    /// whom only the sight is measured.
     pub persons: Vec<PersonSection>,
     /// Side of the patient on which the doctor likes to have room.
     pub prefer_side: Option<Side>,
@@ -137,7 +140,7 @@ pub struct PersonSection {
     /// and `back` instead of the last two. Left out: across the patient from the robot.
     pub side: Option<Side>,
     /// Level distance from the entry point to the middle of the body, mm. Left out: as near as a
-    /// body of 300 mm depth gets to what stands there.
+    /// body of 300 mm depth gets to what stands there, with the needle 250 mm ahead of it.
     #[schemars(range(min = 50.0, max = 3000.0))]
     pub distance_mm: Option<f64>,
     /// Place in the world, mm, instead of `side` and `distance_mm`.

@@ -103,14 +103,19 @@ impl Default for NeedleRouteSection {
 #[serde(deny_unknown_fields, default)]
 pub struct PlanningSection {
     /// Clearance of arm and tool from their surroundings below which a posture or motion is
-    /// rejected, mm: the floor of all classes. What `[criteria]` wants of a class beyond it is planned
-    /// for, and missing that fails a configuration but does not reject it.
+    /// rejected, mm: the floor of all classes but the guide's intended stand-off from the skin. What
+    /// `[criteria]` wants of a class beyond it is planned for, and missing that fails a configuration but
+    /// does not reject it.
     #[schemars(range(min = 0.0, max = 200.0))]
     pub min_clearance_mm: f64,
     /// Clearance of arm and tool from themselves below which a posture or motion is rejected, mm.
     /// Forearm and wrist 2 are about 10 mm apart in most postures.
     #[schemars(range(min = 0.0, max = 200.0))]
     pub min_self_clearance_mm: f64,
+    /// Clearance of arm and tool from the people of `[[people.persons]]` below which a posture or motion is rejected, mm,
+    /// if `min_clearance_mm` is not larger. The default is assumed: what somebody who stands still sways and shifts.
+    #[schemars(range(min = 0.0, max = 500.0))]
+    pub min_person_clearance_mm: f64,
     /// What postures and motions are planned to keep beyond what `[criteria]` or the floors want of
     /// each class, where they can, mm: criteria are judged by proven bounds of simulated motions, which
     /// are off the planned ones by the certificate's tolerance (0.1) and by the servo's tracking (assumed
@@ -157,6 +162,7 @@ impl Default for PlanningSection {
         Self {
             min_clearance_mm: 0.0,
             min_self_clearance_mm: 0.0,
+            min_person_clearance_mm: 50.0,
             clearance_reserve_mm: 1.0,
             min_singularity_sine: 0.01,
             min_shoulder_distance_mm: 5.0,

@@ -1,11 +1,13 @@
 //! The arm: `[robot]`.
 
+use std::collections::BTreeMap;
+
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
 use super::models::names_or_path;
 use crate::arm::Arm;
-use crate::robot::MissingInertia;
+use crate::robot::{MissingInertia, StatedShape};
 
 /// The arm.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -19,6 +21,11 @@ pub struct RobotSection {
     /// of a shipped one, or the path of an `arm.toml` or its folder relative to this file. Left out: the
     /// `arm.toml` beside the URDF, or the shipped arm with the URDF's lengths.
     pub arm: Option<String>,
+    /// What stands before the names of the robot's links and joints in the URDF, such as `left_` where a file has two
+    /// arms. Left out: what the joints of its only arm have in common. With it, joints that are not the arm's stand
+    /// still at 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prefix: Option<String>,
     /// Position of `base_link` in the world (z up, floor at 0), mm; the arm's own if left out.
     #[schemars(inner(range(min = -5000.0, max = 5000.0)))]
     pub base_position_mm: Option<[f64; 3]>,
@@ -32,6 +39,11 @@ pub struct RobotSection {
     /// file. Its joint origins replace the URDF's. The nominal arm if left out; a robot or a
     /// calibration of the command line replaces it.
     pub calibration: Option<String>,
+    /// Collision shapes of links, by a link's name in the URDF or its label (`forearm`), where they are not to be
+    /// completed by what is known of the arm: `none` for one that needs none, `given` for the URDF's as they are.
+    /// Every report names those without a shape.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub shape: BTreeMap<String, StatedShape>,
 }
 
 fn arms(_: &mut SchemaGenerator) -> Schema {

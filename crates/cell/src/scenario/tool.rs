@@ -1,9 +1,12 @@
 //! The needle guide: `[tool]`.
 
+use std::collections::BTreeMap;
+
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use super::models::reference_schema;
+use crate::robot::StatedShape;
 
 /// Outer diameters of needles by gauge, mm: the nominal sizes of the needle gauge chart.
 pub(crate) const NEEDLE_OUTER_DIAMETER_MM: [(u32, f64); 11] = [
@@ -66,6 +69,9 @@ pub struct ToolSection {
     /// to the end of that volume; it counts as part of it. 0 leaves the cone out. Default assumed.
     #[schemars(range(min = 0.0, max = 80.0))]
     pub hand_cone_half_angle_deg: f64,
+    /// Links of the tool's URDF that need no collision shape, each as `NAME = "none"`: every report names them.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub shape: BTreeMap<String, StatedShape>,
 }
 
 impl Default for ToolSection {
@@ -82,6 +88,7 @@ impl Default for ToolSection {
             corridor_radius_mm: 25.0,
             corridor_length_mm: None,
             hand_cone_half_angle_deg: 12.0,
+            shape: BTreeMap::new(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod arm_models;
 mod arms;
+mod assumed;
 mod calibration;
 mod family;
 mod foreign_urdf;
@@ -12,6 +13,7 @@ mod measured;
 mod moves;
 mod obstacles;
 mod pair_classes;
+mod people;
 mod schema;
 mod schema_probes;
 mod study;

@@ -66,6 +66,7 @@ fn every_class_has_exactly_the_pairs_of_its_definition() {
         ("robot_table", product(&moving, &["table"])),
         ("robot_gantry", product(&moving, &["gantry"])),
         ("robot_mount", product(&moving, &["mount"])),
+        ("robot_person", product(&moving, &["doctor", "doctor_2"])),
         ("self", own),
         ("tool_phantom", product(&["tool"], &["phantom"])),
         ("guide_standoff", product(&["guide_tube"], &["phantom"])),
@@ -89,6 +90,10 @@ fn what_is_left_out_shares_a_joint_or_cannot_move() {
             match rule {
                 PairRule::Measured(_) => {}
                 PairRule::LeftOut(LeftOut::Fixed) => assert_eq!(joints, 0),
+                PairRule::LeftOut(LeftOut::Hand) => {
+                    assert_eq!(a.name, "needle_corridor");
+                    assert!(b.name.starts_with("doctor"), "{}", b.name);
+                }
                 PairRule::LeftOut(LeftOut::Adjacent) => {
                     assert_eq!(joints, 1);
                     adjacent += 1;

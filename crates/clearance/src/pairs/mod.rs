@@ -153,11 +153,14 @@ pub fn examine_pairs(cell: &Cell, settings: &PairSettings) -> Vec<PairExaminatio
         .collect()
 }
 
-/// All pairs, `a` being the one further from the base.
+/// All pairs but a person and the space for the hand, `a` being the one further from the base.
 fn every_pair(cell: &Cell) -> Vec<BodyPair> {
     let mut every = Vec::new();
     for i in 0..cell.bodies.len() {
         for j in i + 1..cell.bodies.len() {
+            if pair_rule(&cell.bodies[i], &cell.bodies[j]) == PairRule::LeftOut(LeftOut::Hand) {
+                continue;
+            }
             let place = |body: usize| place_in_chain(cell.bodies[body].frame);
             let (a, b) = if place(i) >= place(j) { (i, j) } else { (j, i) };
             every.push(BodyPair {
@@ -237,7 +240,7 @@ fn examine(
     }
     let apart = nearest.is_some_and(|bound| bound.lower_m > 0.0);
     let state = match rule {
-        PairRule::LeftOut(LeftOut::Fixed) => PairState::Fixed,
+        PairRule::LeftOut(LeftOut::Fixed | LeftOut::Hand) => PairState::Fixed,
         PairRule::LeftOut(LeftOut::Adjacent) => PairState::Adjacent,
         PairRule::Measured(_) if always => PairState::Always,
         PairRule::Measured(_) if apart => PairState::Never,

@@ -30,6 +30,7 @@ fn color(kind: BodyKind) -> &'static str {
         BodyKind::Gantry => "0.90 0.90 0.88 0.5",
         BodyKind::Mount => "0.55 0.55 0.58 1",
         BodyKind::Obstacle => "0.60 0.55 0.45 1",
+        BodyKind::Person => "0.35 0.45 0.65 0.35",
     }
 }
 

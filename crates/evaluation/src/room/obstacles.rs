@@ -38,11 +38,11 @@ struct Placed<'o> {
 }
 
 impl<'c> Obstacles<'c> {
-    /// All solids of the cell but the needle corridor, which is none.
+    /// All solids of the cell but the needle corridor, which is none, and people, who are those that look.
     pub fn new(cell: &'c Cell) -> Self {
         let mut solids = Vec::new();
         for (index, body) in cell.bodies.iter().enumerate() {
-            if body.kind == BodyKind::NeedleCorridor {
+            if matches!(body.kind, BodyKind::NeedleCorridor | BodyKind::Person) {
                 continue;
             }
             let is_robot = body.kind == BodyKind::Base || matches!(body.frame, Frame::Link(_));

@@ -51,6 +51,7 @@ fn colour(kind: BodyKind) -> Option<Colour> {
         BodyKind::Gantry => [0.85, 0.86, 0.88, 0.35],
         BodyKind::Mount => [0.45, 0.47, 0.50, 1.0],
         BodyKind::Obstacle => [0.75, 0.45, 0.30, 0.8],
+        BodyKind::Person => [0.35, 0.45, 0.65, 0.35],
         BodyKind::NeedleCorridor => return None,
     }))
 }

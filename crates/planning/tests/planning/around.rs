@@ -176,7 +176,7 @@ fn a_search_that_ends_without_a_motion_says_so() {
         rejection.detail.contains("no way around was found"),
         "{rejection:?}"
     );
-    assert!(rejection.detail.contains("straight motion is blocked by"));
+    assert!(rejection.detail.contains("on the straight one"));
     // Each of the searches stops once the budget is used up; one more straight way may be looked at.
     let effort = found.search.expect("it was searched");
     assert!(effort.checks < 400, "{effort:?}");

@@ -36,6 +36,8 @@ name = "beside"
 [robot]
 base_position_mm = [0, 0, 800]
 base_rpy_deg = [0, 0, 180]
+[tool]
+urdf = "offset"
 [phantom]
 position_mm = [146, -597.5, 0]
 [table]

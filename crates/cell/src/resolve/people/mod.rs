@@ -3,10 +3,12 @@
 //! Where a scenario says nothing, a doctor stands across the patient from the robot, as near to the
 //! entry point as the furniture allows, in three statures.
 
+mod body;
 mod placing;
 
 pub use crate::scenario::{ElbowPreference, Handedness, Role, Side, StaturePercentile};
 use crate::scenario::{PeopleSection, PersonSection};
+pub(crate) use body::drawn;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 pub(crate) use placing::{Room, check_sides, have_room_by_boxes, resolve_people};
 

@@ -18,6 +18,8 @@ pub(crate) struct Room<'a> {
     /// Body names with their solids, in the world.
     pub solids: &'a [(&'a str, &'a Solid)],
     pub robot_base_m: Point3<f64>,
+    /// Length of the needle from hub to tip.
+    pub needle_m: f64,
 }
 
 /// Places everybody, for every goal.
@@ -234,7 +236,7 @@ fn directions(
 
 impl Goal {
     /// Where people stand about: the entry point, or the guide's exit where there is no patient.
-    fn standing_place(&self) -> Point3<f64> {
+    pub(super) fn standing_place(&self) -> Point3<f64> {
         self.entry_m
             .unwrap_or_else(|| self.world_from_guide_exit.translation.vector.into())
     }
@@ -309,7 +311,8 @@ fn place(
     for (side, direction) in directions {
         for step in 0..FARTHEST_STEPS {
             let position = at(&direction, way_m(step));
-            if obstacles.hit(&position, tallest_m).is_none() {
+            let is_ahead = obstacles.needle_ahead_m(goal, &position) >= BODY_RADIUS_M + HANDS_M;
+            if is_ahead && obstacles.hit(&position, tallest_m).is_none() {
                 return Ok((side, position));
             }
         }
@@ -325,6 +328,10 @@ fn place(
         )
         .hint("choose another side, or give `position_mm`"))
 }
+
+/// From a body's front to the hands that hold the needle, m, for who finds a place: between a forearm held close and a
+/// comfortable reach (assumed; elbow to grip is 0.30 to 0.37 m of adults, Pheasant, Bodyspace, 1996).
+const HANDS_M: f64 = 0.25;
 
 /// Steps away from the patient until there is room to stand, and how many are tried.
 const STEP_M: f64 = 0.01;
@@ -346,6 +353,7 @@ struct Obstacle<'a> {
 struct Obstacles<'a> {
     solids: Vec<Obstacle<'a>>,
     robot_base_m: Point3<f64>,
+    needle_m: f64,
 }
 
 impl<'a> Obstacles<'a> {
@@ -358,7 +366,17 @@ impl<'a> Obstacles<'a> {
         Self {
             solids: solids.collect(),
             robot_base_m: room.robot_base_m,
+            needle_m: room.needle_m,
         }
+    }
+
+    /// Level distance of a place from the needle whose tip is on the skin.
+    fn needle_ahead_m(&self, goal: &Goal, place: &Point3<f64>) -> f64 {
+        let tip = goal.standing_place();
+        let along = -goal.axis.into_inner() * self.needle_m;
+        let (along, to_place) = (along.xy(), (place - tip).xy());
+        let share = to_place.dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
+        (to_place - along * share.clamp(0.0, 1.0)).norm()
     }
 
     /// What a body that stands here would be in, if anything: axis and rim are tried every 50 mm.

@@ -201,6 +201,7 @@ fn robot() -> Robot {
         ),
         links,
         members: Vec::new(),
+        unseen: Vec::new(),
         bodies: [Body::massless(); JOINT_COUNT],
         limits: JointLimits(
             [JointLimit {
@@ -226,6 +227,7 @@ fn tool() -> Tool {
             cuboid("tool.arm", [0.06, 0.0, 0.01], [0.05, 0.012, 0.005]),
             tube("tool.boss", [0.1, 0.0, 0.0], [0.1, 0.0, 0.02], 0.012),
         ],
+        unseen: Vec::new(),
         guide_solids: vec![solid(
             "guide_tube.1",
             Shape::Capsule {

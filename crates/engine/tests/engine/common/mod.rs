@@ -174,6 +174,7 @@ fn tool() -> Tool {
     Tool {
         name: "test".into(),
         solids: vec![cuboid("tool.1", [0.0, 0.03, 0.01], [0.04, 0.08, 0.02])],
+        unseen: Vec::new(),
         guide_solids: vec![cylinder(
             "guide",
             [0.0, 0.06, 0.06],
@@ -252,6 +253,7 @@ pub fn ur3(surroundings: Vec<CollisionBody>) -> Cell {
         base: link("base", vec![base_solid]),
         links: JOINT_LABELS.map(|name| link(name, solids.next().expect("six links"))),
         members: Vec::new(),
+        unseen: Vec::new(),
         bodies: link_bodies(),
         limits: limits(),
         arm: None,

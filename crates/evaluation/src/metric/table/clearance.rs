@@ -279,6 +279,21 @@ pub(super) const TO_OBSTACLES: &[Metric] = {
     )
 };
 
+pub(super) const TO_PEOPLE: &[Metric] = {
+    const fn with(metric: Metric) -> Metric {
+        headed(metric, None, (6, "To people"))
+    }
+    clearance_of_class!(
+        RobotPerson,
+        "to_people",
+        "arm and tool to people",
+        "clearance of arm and tool from the people in the room",
+        "min_clearance_mm.robot_person",
+        robot_person,
+        with
+    )
+};
+
 pub(super) const SELF_CLEARANCE: &[Metric] = {
     const fn with(metric: Metric) -> Metric {
         let nearest = Statistics::BY_CASE.criterion("min_self_mm").page(Coarse);

@@ -60,6 +60,7 @@ pub const GROUPS: &[Group] = &[
     group("To the gantry", clearance::TO_GANTRY),
     group("To the mount", clearance::TO_MOUNT),
     group("To obstacles", clearance::TO_OBSTACLES),
+    group("To people", clearance::TO_PEOPLE),
     group("The arm from itself", clearance::SELF_CLEARANCE),
     group("Tool to skin", clearance::TOOL_TO_SKIN),
     group("Guide to skin", clearance::GUIDE_TO_SKIN),

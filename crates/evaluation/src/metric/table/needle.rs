@@ -391,7 +391,7 @@ pub(super) const BUDGET: &[Metric] = &[
     Metric::new(
         "tip_within_95",
         "95 % of tip errors",
-        "distance of the needle's tip from the target that 95 % of the draws stay within",
+        "distance of the needle's tip from the target that 95 % of all arms and patients stay within",
         Length,
         Configuration(|each| each.budget.as_ref()?.total.at_target.radius_95_m),
     )
