@@ -1,6 +1,7 @@
 //! The cell as a picture in space: binary glTF 2.0.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
 use nalgebra::{Translation3, UnitQuaternion};
 use needlebench_bench::provenance::PROGRAM_VERSION;
@@ -48,7 +49,16 @@ pub enum Shown {
     },
 }
 
-/// The cell in a posture as one `STEM.glb`: a node for each link, below the one that it turns on, with the surfaces of
+/// How a scene is packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Packing {
+    /// One binary file, `STEM.glb`.
+    Binary,
+    /// The scene as JSON, `STEM.gltf`, and its numbers beside it, `STEM.bin`.
+    Separate,
+}
+
+/// The cell in a posture, packed: a node for each link, below the one that it turns on, with the surfaces of
 /// pages. Metres, y up; scene coordinates are those of the scenario's world below the node `world`.
 ///
 /// # Errors
@@ -57,6 +67,7 @@ pub fn gltf(
     resolved: &ResolvedScenario,
     stem: &str,
     shown: &Shown,
+    packing: Packing,
 ) -> Result<Vec<ExportedFile>, ExportError> {
     let posed = Posed::of(resolved, shown)?;
     let mut scene = Scene::default();
@@ -85,10 +96,13 @@ pub fn gltf(
         extras["planned"] = json!(posed.broken_rules.is_empty() && posed.motion.is_some());
         extras["broken_rules"] = json!(posed.broken_rules);
     }
-    Ok(vec![ExportedFile {
-        name: format!("{stem}.glb"),
-        bytes: scene.binary(&extras),
-    }])
+    Ok(match packing {
+        Packing::Binary => vec![ExportedFile {
+            name: format!("{stem}.glb"),
+            bytes: scene.binary(&extras),
+        }],
+        Packing::Separate => scene.separate(&extras, stem),
+    })
 }
 
 /// A posture, and how the arm gets there.
@@ -445,8 +459,23 @@ impl Scene {
         }));
     }
 
-    /// The file: a head, the scene as JSON, and the numbers.
-    fn binary(mut self, extras: &Value) -> Vec<u8> {
+    /// Two files: the scene as JSON, and the numbers.
+    fn separate(mut self, extras: &Value, stem: &str) -> Vec<ExportedFile> {
+        let mut scene = self.described(extras);
+        let numbers = format!("{stem}.bin");
+        // A path of another file in JSON is a URI.
+        scene["buffers"][0]["uri"] = json!(as_uri(&numbers));
+        vec![
+            ExportedFile::text(format!("{stem}.gltf"), scene.to_string()),
+            ExportedFile {
+                name: numbers,
+                bytes: self.bytes,
+            },
+        ]
+    }
+
+    /// The scene as JSON, but for where its numbers are.
+    fn described(&mut self, extras: &Value) -> Value {
         for (node, children) in &self.children {
             self.nodes[*node]["children"] = json!(children);
         }
@@ -461,10 +490,15 @@ impl Scene {
             "bufferViews": self.views,
             "buffers": [{"byteLength": self.bytes.len()}],
         });
-        if let Some(animation) = self.animation {
+        if let Some(animation) = &self.animation {
             scene["animations"] = json!([animation]);
         }
-        let mut text = scene.to_string().into_bytes();
+        scene
+    }
+
+    /// One file: a head, the scene as JSON, and the numbers.
+    fn binary(mut self, extras: &Value) -> Vec<u8> {
+        let mut text = self.described(extras).to_string().into_bytes();
         text.resize(text.len().next_multiple_of(4), b' ');
         let length = |bytes: usize| {
             u32::try_from(bytes)
@@ -482,6 +516,19 @@ impl Scene {
         }
         file
     }
+}
+
+/// A file's name as a relative URI (RFC 3986): all but unreserved characters by their bytes.
+fn as_uri(name: &str) -> String {
+    let mut uri = String::new();
+    for byte in name.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
+            uri.push(char::from(byte));
+        } else {
+            let _ = write!(uri, "%{byte:02X}");
+        }
+    }
+    uri
 }
 
 /// Numbers of the format.

@@ -22,7 +22,7 @@ mod urscript;
 
 pub use error::ExportError;
 pub use file::ExportedFile;
-pub use gltf::{Shown, gltf};
+pub use gltf::{Packing, Shown, gltf};
 pub use mcap::mcap;
 pub use mjcf::mjcf;
 pub use motion::Motion;

@@ -182,31 +182,8 @@ impl Writer {
     }
 
     fn link(&mut self, name: &str, body: Option<&Body>, visuals: &[Visual], solids: &[Solid]) {
-        let body = body.filter(|body| body.mass_kg > 0.0);
-        if body.is_none() && visuals.is_empty() && solids.is_empty() {
-            self.line(&format!("  <link name=\"{}\"/>", escape(name)));
-            return;
-        }
         self.open_link(name);
-        if let Some(body) = body {
-            let inertia = &body.inertia_kgm2;
-            self.line("    <inertial>");
-            self.line(&format!(
-                "      <origin xyz=\"{}\" rpy=\"0 0 0\"/>",
-                vector(&body.com_m)
-            ));
-            self.line(&format!("      <mass value=\"{}\"/>", body.mass_kg));
-            self.line(&format!(
-                "      <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"/>",
-                inertia[(0, 0)],
-                inertia[(0, 1)],
-                inertia[(0, 2)],
-                inertia[(1, 1)],
-                inertia[(1, 2)],
-                inertia[(2, 2)]
-            ));
-            self.line("    </inertial>");
-        }
+        self.inertial(&body.copied().unwrap_or(Body::massless()));
         for (number, visual) in (1..).zip(visuals) {
             let file = self.mesh(&format!("{name}_visual_{number}"), &visual.mesh);
             self.visual(&[(visual.parent_from_visual, file)], &visual.color_rgba);
@@ -215,9 +192,32 @@ impl Writer {
         self.line("  </link>");
     }
 
+    /// What has no mass says so: of a link that says nothing `PyBullet` takes 1 kg, and `MuJoCo` what its collision shapes
+    /// weigh in water.
+    fn inertial(&mut self, body: &Body) {
+        let inertia = &body.inertia_kgm2;
+        self.line("    <inertial>");
+        self.line(&format!(
+            "      <origin xyz=\"{}\" rpy=\"0 0 0\"/>",
+            vector(&body.com_m)
+        ));
+        self.line(&format!("      <mass value=\"{}\"/>", body.mass_kg));
+        self.line(&format!(
+            "      <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"/>",
+            inertia[(0, 0)],
+            inertia[(0, 1)],
+            inertia[(0, 2)],
+            inertia[(1, 1)],
+            inertia[(1, 2)],
+            inertia[(2, 2)]
+        ));
+        self.line("    </inertial>");
+    }
+
     /// A link that looks as it collides.
     fn plain_link(&mut self, name: &str, color_rgba: [f32; 4], solids: &[Solid]) {
         self.open_link(name);
+        self.inertial(&Body::massless());
         for solid in solids {
             let geometry = self.geometry(solid);
             self.visual(&geometry, &color_rgba);
@@ -229,6 +229,7 @@ impl Writer {
     /// The patient: all that is seen, as on pages, and the outside to collide with.
     fn phantom(&mut self, name: &str, resolved: &ResolvedScenario, solids: &[Solid]) {
         self.open_link(name);
+        self.inertial(&Body::massless());
         for surface in surfaces_of_cell(resolved).0 {
             if TISSUES.contains(&surface.group) {
                 let file = self.mesh(&format!("{name}_{}", surface.group), &surface.mesh);
@@ -405,8 +406,8 @@ fn color(kind: BodyKind) -> [f32; 4] {
         BodyKind::Table => [0.62, 0.68, 0.74, 1.0],
         BodyKind::Gantry => [0.9, 0.9, 0.88, 1.0],
         BodyKind::Mount => [0.55, 0.55, 0.58, 1.0],
-        _ => [0.6, 0.55, 0.45, 1.0],
         BodyKind::Person => [0.35, 0.45, 0.65, 0.35],
+        _ => [0.6, 0.55, 0.45, 1.0],
     }
 }
 
@@ -445,6 +446,7 @@ fn srdf(resolved: &ResolvedScenario) -> Result<String, ExportError> {
                 PairRule::Measured(_) => continue,
                 PairRule::LeftOut(LeftOut::Adjacent) => "Adjacent",
                 PairRule::LeftOut(LeftOut::Fixed) => "Never",
+                PairRule::LeftOut(LeftOut::Hand) => "Default",
             };
             let _ = writeln!(
                 text,

@@ -1,7 +1,7 @@
 //! glTF.
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-use needlebench_export::{ExportError, Shown, gltf};
+use needlebench_export::{ExportError, Packing, Shown, gltf};
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::{JOINT_NAMES, Joints, LINK_NAMES, Pose};
 use serde_json::Value;
@@ -56,7 +56,7 @@ fn pose(scene: &Value, name: &str) -> Pose {
 fn links_are_where_the_arm_has_them_and_y_is_up() {
     let resolved = hanging();
     let joints = Joints::new(0.3, -1.2, 0.8, -0.4, 1.1, 2.9);
-    let files = gltf(&resolved, "cell", &Shown::Joints(joints)).unwrap();
+    let files = gltf(&resolved, "cell", &Shown::Joints(joints), Packing::Binary).unwrap();
     let (scene, _) = read(&files[0].bytes);
     let world = pose(&scene, "world");
     let up = world * nalgebra::Vector3::z();
@@ -73,8 +73,22 @@ fn links_are_where_the_arm_has_them_and_y_is_up() {
 }
 
 #[test]
+fn a_scene_in_two_files_is_the_one_of_the_binary_file() {
+    let files = |packing| gltf(&hanging(), "my cell", &Shown::Start, packing).unwrap();
+    let binary = files(Packing::Binary);
+    let (mut wanted, numbers) = read(&binary[0].bytes);
+    let apart = files(Packing::Separate);
+    let names: Vec<&str> = apart.iter().map(|file| &*file.name).collect();
+    assert_eq!(names, ["my cell.gltf", "my cell.bin"]);
+    wanted["buffers"][0]["uri"] = "my%20cell.bin".into();
+    let scene: Value = serde_json::from_slice(&apart[0].bytes).unwrap();
+    assert_eq!(scene, wanted);
+    assert_eq!(apart[1].bytes, numbers);
+}
+
+#[test]
 fn surfaces_are_within_the_numbers_that_the_file_has() {
-    let files = gltf(&hanging(), "cell", &Shown::Start).unwrap();
+    let files = gltf(&hanging(), "cell", &Shown::Start, Packing::Binary).unwrap();
     let (scene, bytes) = read(&files[0].bytes);
     let view = |accessor: &Value| {
         let index = usize::try_from(accessor["bufferView"].as_u64().unwrap()).unwrap();
@@ -110,7 +124,7 @@ fn a_motion_is_an_animation_from_the_start_to_the_posture() {
         goal: 0,
         configuration,
     };
-    let files = gltf(&resolved, "cell", &shown).unwrap();
+    let files = gltf(&resolved, "cell", &shown, Packing::Binary).unwrap();
     let (scene, _) = read(&files[0].bytes);
     assert_eq!(scene["asset"]["extras"]["planned"], true);
     let animation = &scene["animations"][0];
@@ -120,7 +134,7 @@ fn a_motion_is_an_animation_from_the_start_to_the_posture() {
     let wanted = pose(&scene, "world") * resolved.cell.robot.world_from_flange(&joints.into());
     let off = wanted.inverse() * pose(&scene, "tool0");
     assert!(off.translation.vector.norm() < 1e-14);
-    let still = gltf(&resolved, "cell", &Shown::Start).unwrap();
+    let still = gltf(&resolved, "cell", &Shown::Start, Packing::Binary).unwrap();
     assert!(read(&still[0].bytes).0["animations"].is_null());
 }
 
@@ -133,7 +147,7 @@ fn a_goal_out_of_reach_has_no_picture() {
         goal: 0,
         configuration: Configuration::ALL[0],
     };
-    let error = gltf(&resolved, "cell", &shown).unwrap_err();
+    let error = gltf(&resolved, "cell", &shown, Packing::Binary).unwrap_err();
     assert!(matches!(error, ExportError::NoPosture { .. }), "{error}");
     assert!(error.to_string().contains("`pose`"), "{error}");
 }

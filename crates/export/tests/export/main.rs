@@ -7,7 +7,7 @@ mod urdf;
 use std::path::Path;
 
 use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
-use needlebench_export::{ExportError, ExportedFile, Shown};
+use needlebench_export::{ExportError, ExportedFile, Packing, Shown};
 
 /// A cell with obstacles of meshes, people and a gantry, hanging.
 fn hanging() -> ResolvedScenario {
@@ -45,7 +45,7 @@ fn the_same_scenario_gives_the_same_files() {
             "cell.urdf",
         ),
         (
-            |resolved| needlebench_export::gltf(resolved, "cell", &Shown::Start),
+            |resolved| needlebench_export::gltf(resolved, "cell", &Shown::Start, Packing::Binary),
             "cell.glb",
         ),
     ];

@@ -56,6 +56,28 @@ fn links_of_pairs_and_files_of_meshes_are_there() {
     }
 }
 
+/// Programs disagree about a link that does not say its mass.
+#[test]
+fn every_link_says_its_mass_and_all_weigh_what_the_arm_and_the_tool_do() {
+    let resolved = hanging();
+    let files = urdf(&resolved, "cell").unwrap();
+    let description = text(&files[0]);
+    let (_, links) = description.split_once("<link name=\"world\"/>").unwrap();
+    for link in all_between(links, "<link name=\"", "</link>") {
+        assert_eq!(link.matches("<inertial>").count(), 1, "{link}");
+    }
+    let masses = all_between(description, "<mass value=\"", "\"");
+    assert_eq!(
+        masses.len(),
+        description.matches("<link ").count() - 1,
+        "all but the world"
+    );
+    let whole: f64 = masses.iter().map(|mass| mass.parse::<f64>().unwrap()).sum();
+    let cell = &resolved.cell;
+    let arm: f64 = cell.robot.bodies.iter().map(|body| body.mass_kg).sum();
+    assert!((whole - arm - cell.tool.body.mass_kg).abs() < 1e-9);
+}
+
 #[test]
 fn a_capsule_is_a_cylinder_and_two_spheres() {
     let mut resolved = hanging();
