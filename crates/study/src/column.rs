@@ -40,11 +40,16 @@ pub struct MetricColumn {
     pub criterion: Option<String>,
 }
 
+/// Beginning of the keys of the needle's distance from bone, vessels and organs, the same for all configurations.
+const ROUTE_KEY: &str = "needle_route";
+
 /// Which columns stand for what.
 #[derive(Debug, Clone)]
 pub(crate) struct Measures {
     clearance: Vec<usize>,
     tip_error: Vec<usize>,
+    /// Columns of the needle's distance, and the least that is asked about.
+    route: Option<(Vec<usize>, f64)>,
 }
 
 impl Measures {
@@ -57,7 +62,24 @@ impl Measures {
         Self {
             clearance: of(Measure::Clearance),
             tip_error: of(Measure::TipError),
+            route: None,
         }
+    }
+
+    /// With how far the needle is to keep away from bone, vessels and organs, mm.
+    pub(crate) fn with_route(mut self, columns: &[MetricColumn], least_mm: Option<f64>) -> Self {
+        let found = indices(columns, |column| column.key.starts_with(ROUTE_KEY));
+        self.route = least_mm.map(|least_mm| (found, least_mm));
+        self
+    }
+
+    /// Whether the needle of a layout keeps away as far as is asked about; none where nobody asks, or nothing is known.
+    pub(crate) fn keeps_away(&self, rows: &[Row]) -> Option<bool> {
+        let (columns, least_mm) = self.route.as_ref()?;
+        let mut known = rows
+            .iter()
+            .flat_map(|row| columns.iter().filter_map(|&column| row.get(column)));
+        Some(f64::from(known.next()?) >= *least_mm)
     }
 
     pub(crate) fn clearance(&self, row: &Row) -> Option<f32> {

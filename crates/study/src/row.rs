@@ -17,11 +17,20 @@ pub enum Outcome {
     Rejected = 2,
     /// The layout cannot exist; [`Row::detail`] is the key that is at fault.
     Invalid = 3,
+    /// It works and misses no criterion that could be judged, but one could not be, or an engine could not carry out
+    /// its motion; [`Row::detail`] names which.
+    NotJudged = 4,
 }
 
 impl Outcome {
     /// All of them, each at the index that it is cast to.
-    pub const ALL: [Self; 4] = [Self::Ok, Self::Failed, Self::Rejected, Self::Invalid];
+    pub const ALL: [Self; 5] = [
+        Self::Ok,
+        Self::Failed,
+        Self::Rejected,
+        Self::Invalid,
+        Self::NotJudged,
+    ];
 
     /// Name in files.
     pub fn name(self) -> &'static str {
@@ -30,6 +39,7 @@ impl Outcome {
             Self::Failed => "failed",
             Self::Rejected => "rejected",
             Self::Invalid => "invalid",
+            Self::NotJudged => "not_judged",
         }
     }
 }
@@ -43,7 +53,8 @@ pub struct Row {
     /// What became of it.
     pub outcome: Outcome,
     /// The rule or criterion that it breaks, as `collision robot_phantom` or
-    /// `max_tip_position_error_mm`; the key at fault of an invalid layout; empty if it is ok.
+    /// `max_tip_position_error_mm`; the key at fault of an invalid layout; what could not be judged, as `engine_failure
+    /// rapier`; empty if it is ok.
     pub detail: Cow<'static, str>,
     /// Values of the study's columns; NaN where a row has none, and none beyond the last.
     pub values: Vec<f32>,

@@ -67,7 +67,7 @@ impl CaseCost {
 /// The rows of a case by the motions in the engines: what [`run_scenario`](crate::run_scenario) would
 /// report of the same scenario, number for number.
 ///
-/// A configuration whose motion an engine cannot carry out has [`Outcome::Failed`] with the detail
+/// A configuration whose motion an engine cannot carry out is [`Outcome::NotJudged`] with the detail
 /// `engine_failure rapier`, and no measured numbers.
 ///
 /// # Errors
@@ -216,11 +216,12 @@ impl<'a> Case<'a> {
         eight(rows.map(|((plan, measured), failed)| {
             let (outcome, detail) = match (broken_rule(&plan.rejections), failed, measured.status) {
                 (Some(rule), _, _) => (Outcome::Rejected, rule),
-                (None, Some(engine), _) => {
-                    (Outcome::Failed, format!("{ENGINE_FAILURE} {engine}").into())
-                }
+                (None, Some(engine), _) => (
+                    Outcome::NotJudged,
+                    format!("{ENGINE_FAILURE} {engine}").into(),
+                ),
                 (None, None, Status::Ok) if measured.not_judged == 0 => (Outcome::Ok, "".into()),
-                (None, None, _) => (Outcome::Failed, missed(&judged, measured.label)),
+                (None, None, _) => missed(&judged, measured.label),
             };
             CaseRow {
                 outcome,
@@ -233,22 +234,23 @@ impl<'a> Case<'a> {
     }
 }
 
-/// The first criterion that a configuration misses, or else that could not be judged, which is not met.
-fn missed(judged: &Judged, label: &str) -> Cow<'static, str> {
+/// The first criterion that a configuration misses, or else that could not be judged.
+fn missed(judged: &Judged, label: &str) -> (Outcome, Cow<'static, str>) {
     let counts = |of: Option<&str>, criterion: &str| of == Some(label) && criterion != "expected";
     let missed = judged
         .results
         .iter()
         .filter(|result| !result.pass)
-        .map(|each| (each.label.as_deref(), &each.criterion));
+        .map(|each| (Outcome::Failed, each.label.as_deref(), &each.criterion));
     let unjudged = judged
         .not_judged
         .iter()
-        .map(|each| (each.label.as_deref(), &each.criterion));
+        .map(|each| (Outcome::NotJudged, each.label.as_deref(), &each.criterion));
     missed
         .chain(unjudged)
-        .find(|(of, criterion)| counts(*of, criterion))
-        .map_or("no_engine".into(), |(_, criterion)| {
-            criterion.clone().into()
-        })
+        .find(|(_, of, criterion)| counts(*of, criterion))
+        .map_or(
+            (Outcome::NotJudged, "no_engine".into()),
+            |(outcome, _, criterion)| (outcome, criterion.clone().into()),
+        )
 }

@@ -81,7 +81,7 @@ pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[CaseRow; 8], String>
         let (outcome, detail) = match broken_rule(&plan.rejections) {
             Some(rule) => (Outcome::Rejected, rule),
             None => match missed(goal, criteria, &measured) {
-                Some(criterion) => (Outcome::Failed, criterion),
+                Some((outcome, criterion)) => (outcome, criterion),
                 None => (Outcome::Ok, "".into()),
             },
         };
@@ -101,13 +101,12 @@ fn missed(
     goal: &str,
     criteria: &CriteriaSection,
     report: &ConfigurationReport,
-) -> Option<Cow<'static, str>> {
+) -> Option<(Outcome, Cow<'static, str>)> {
     let judged = check_configuration(goal, report, criteria, StudyMode::Planned, &[]);
     let missed = judged.results.into_iter().find(|result| !result.pass);
-    // What cannot be judged is not met.
     let unjudged = judged.not_judged.into_iter().next();
-    let criterion = missed.map(|result| result.criterion);
-    Some(criterion.or(unjudged.map(|each| each.criterion))?.into())
+    let missed = missed.map(|result| (Outcome::Failed, result.criterion.into()));
+    missed.or(unjudged.map(|each| (Outcome::NotJudged, each.criterion.into())))
 }
 
 /// One row of each configuration.

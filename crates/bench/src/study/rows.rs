@@ -133,12 +133,12 @@ pub fn metric_column(key: &MetricKey) -> MetricColumn {
     }
 }
 
-/// The rule that rejects a configuration: `joint_limit`, `collision robot_phantom`.
+/// The rule that rejects a configuration: `joint_limit`, `collision robot_phantom`, `too_close robot_mount`.
 pub(super) fn broken_rule(rejections: &[Rejection]) -> Option<Cow<'static, str>> {
     let rejection = rejections.first()?;
     let name = rejection.rule.name();
     Some(match (rejection.rule, rejection.class) {
-        (Rule::Collision | Rule::NoMotion, Some(class)) => {
+        (Rule::Collision | Rule::TooClose | Rule::NoMotion, Some(class)) => {
             format!("{name} {}", class.name()).into()
         }
         _ => name.into(),

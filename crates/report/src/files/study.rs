@@ -1,6 +1,5 @@
 //! What a study leaves besides its table.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -28,7 +27,7 @@ use crate::table::blocks_text;
 use crate::table::study::answer::Answer;
 use crate::table::study::criteria::requirements_blocks;
 use crate::table::study::document::{Document, Parts};
-use crate::table::study::postures::{Postures, postures_blocks, postures_headline};
+use crate::table::study::postures::{Postures, RouteLeftOut, postures_blocks, postures_headline};
 use crate::table::study::robustness::{robustness_blocks, robustness_method};
 use crate::table::verdict::capitals;
 use needlebench_bench::progress::Progress;
@@ -52,7 +51,9 @@ pub struct StudySummary {
     /// Whether all cases, some of them or none are of postures only: whether a motion gets there is then
     /// not known.
     postures_only: &'static str,
-    /// Postures only, in a sentence; none where all cases have motions.
+    /// Whether the needle's route is no part of what works.
+    without_route: bool,
+    /// Postures only, and the needle's route left out, in sentences; none where all cases have both.
     #[serde(skip_serializing_if = "Option::is_none")]
     headline: Option<String>,
     /// The answer, in a sentence with its figure and interval, and what it compares.
@@ -123,8 +124,10 @@ pub fn write_study(
     let file = &prepared.study.file;
     remove_accuracy(Folder(output.folder))?;
     progress.message("statistics");
+    let left_out = RouteLeftOut::of(prepared);
     let options = SummaryOptions {
         sampling: file.sampling.method,
+        route_mm: left_out.as_ref().map(|route| route.least_mm),
         ..SummaryOptions::default()
     };
     let options = options.judged_by(&file.criteria);
@@ -144,7 +147,12 @@ pub fn write_study(
         progress,
     )?;
     let postures = Postures::of(prepared);
-    let headline = postures_headline(postures, replanned.as_ref());
+    let headline = [
+        postures_headline(postures, replanned.as_ref()),
+        left_out.as_ref().map(RouteLeftOut::in_words),
+    ];
+    let headline: Vec<String> = headline.into_iter().flatten().collect();
+    let headline = (!headline.is_empty()).then(|| headline.join(". "));
     let working = file
         .criteria
         .working_configurations
@@ -176,6 +184,7 @@ pub fn write_study(
         cases: prepared.design.cases(),
         mode: prepared.study.mode.name(),
         postures_only: postures.name(),
+        without_route: left_out.is_some(),
         headline,
         answer,
         replanned,
@@ -249,15 +258,16 @@ fn not_judged(statistics: &Summary, criteria: &[CriterionResult]) -> Vec<String>
             format!("{}{of}: {}", each.criterion, each.detail)
         })
         .collect();
-    let mut failures: BTreeMap<&str, u64> = BTreeMap::new();
-    let configurations = statistics.overall.configurations.iter();
-    for each in configurations.flat_map(|each| &each.details) {
-        if let Some(engine) = each.detail.strip_prefix(ENGINE_FAILURE) {
-            *failures.entry(engine.trim()).or_default() += each.count;
-        }
-    }
-    reasons.extend(failures.into_iter().map(|(engine, count)| {
+    let open = statistics.overall.not_judged();
+    let (failures, criteria): (Vec<_>, Vec<_>) = open
+        .into_iter()
+        .partition(|(detail, _)| detail.starts_with(ENGINE_FAILURE));
+    reasons.extend(failures.into_iter().map(|(detail, count)| {
+        let engine = detail.trim_start_matches(ENGINE_FAILURE).trim();
         format!("{engine} could not carry out {count} motions, of which nothing is measured")
+    }));
+    reasons.extend(criteria.into_iter().map(|(criterion, count)| {
+        format!("{criterion} of the scenario could not be judged of {count} configurations")
     }));
     reasons
 }
@@ -300,15 +310,28 @@ fn verdict_line(summary: &StudySummary) -> String {
         .filter(|each| each.is_judged())
         .count();
     let met = summary.criteria.iter().filter(|each| each.pass).count();
-    let name = format!("{}, {} cases", summary.name, summary.cases);
+    let open = [
+        (summary.postures_only == "all").then_some("postures only"),
+        summary.without_route.then_some("needle route left out"),
+    ];
+    let open: Vec<&str> = open.into_iter().flatten().collect();
+    let open = if open.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", open.join(", "))
+    };
+    let name = format!("{}, {} cases{open}", summary.name, summary.cases);
     let verdict = capitals(summary.verdict);
     if !is_judged(summary) {
-        return format!("{name}: nothing is judged, the study has no criteria");
+        return format!("{name}: no verdict, the study has no criteria of its own");
     }
     if summary.not_judged.is_empty() {
         return format!("{name}: {verdict}: {met} of {total} criteria met");
     }
     let why = summary.not_judged.join("; ");
+    if total == 0 {
+        return format!("{name}: {verdict}: not judged: {why}");
+    }
     let met = if met == judged {
         "all met".to_owned()
     } else {

@@ -117,6 +117,13 @@ pub struct Answer {
     pub front: Vec<FrontMember>,
 }
 
+impl Answer {
+    /// Whether there is something to recommend: the best candidate works in some layout that nothing was compared by.
+    pub fn is_recommended(&self) -> bool {
+        self.rate.value.is_some_and(|rate| rate > 0.0)
+    }
+}
+
 /// All of a search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SearchLog {

@@ -26,12 +26,35 @@ pub struct Counts {
     pub invalid_details: Vec<DetailCount>,
     /// Valid layouts: cases that are not invalid.
     pub layouts: u64,
-    /// Share of the valid layouts in which at least 1, 2, ... 8 configurations are ok.
+    /// Share of the valid layouts in which at least 1, 2, ... 8 configurations are ok. What was not judged counts as not
+    /// ok.
     pub at_least: Vec<Rate>,
+    /// Layouts in which it is not known whether at least 1, 2, ... 8 configurations are ok, because some were not judged.
+    #[serde(default)]
+    pub undecided: Vec<u64>,
+    /// The same of the layouts whose needle keeps away from bone, vessels and organs; none unless the study leaves that
+    /// out of what works.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub with_route: Option<WithRoute>,
     /// Valid layouts in which exactly 0, 1, ... 8 configurations are ok.
     pub working: Vec<u64>,
     /// The eight configurations.
     pub configurations: Vec<ConfigurationCounts>,
+}
+
+/// Rates that count what works by the needle's route too.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WithRoute {
+    /// How far the needle is to keep away, mm.
+    pub least_mm: f64,
+    /// Valid layouts of which the needle's distance is known.
+    pub known: u64,
+    /// Those of them in which it keeps away.
+    pub kept: u64,
+    /// Share of the known ones in which it does and at least 1, 2, ... 8 configurations are ok.
+    pub at_least: Vec<Rate>,
+    /// Share of the known ones in which it does and a configuration is ok, for each of the eight.
+    pub configurations: Vec<Rate>,
 }
 
 /// What became of a configuration.
@@ -45,11 +68,14 @@ pub struct ConfigurationCounts {
     pub failed: u64,
     /// Layouts in which a rule rejects it.
     pub rejected: u64,
+    /// Layouts in which it was not judged.
+    #[serde(default)]
+    pub not_judged: u64,
     /// Layouts in which it is the best: ok, with the largest clearance of those that are.
     pub best: u64,
     /// Share of the valid layouts in which it is ok.
     pub success: Rate,
-    /// What failed and rejected it, the most frequent first.
+    /// What failed and rejected it, and what was not judged, the most frequent first.
     pub details: Vec<DetailCount>,
 }
 
@@ -64,19 +90,69 @@ pub struct DetailCount {
     pub count: u64,
 }
 
+impl Counts {
+    /// How many motions were not judged, by what could not be: `engine_failure rapier`, or a criterion.
+    pub fn not_judged(&self) -> BTreeMap<&str, u64> {
+        let mut counts = BTreeMap::new();
+        let details = self.configurations.iter().flat_map(|each| &each.details);
+        for each in details.filter(|each| each.outcome == Outcome::NotJudged) {
+            *counts.entry(each.detail.as_str()).or_default() += each.count;
+        }
+        counts
+    }
+}
+
 /// Counters of one goal.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Counter {
     invalid: u64,
-    outcomes: [[u64; CONFIGURATIONS]; 3],
+    outcomes: [[u64; CONFIGURATIONS]; Outcome::ALL.len()],
     best: [u64; CONFIGURATIONS],
     working: [u64; CONFIGURATIONS + 1],
     details: [BTreeMap<String, u64>; CONFIGURATIONS],
     failed_details: [BTreeMap<String, u64>; CONFIGURATIONS],
+    open_details: [BTreeMap<String, u64>; CONFIGURATIONS],
+    undecided: [u64; CONFIGURATIONS],
     invalid_details: BTreeMap<String, u64>,
     success: [Grouped; CONFIGURATIONS],
     at_least: [Grouped; CONFIGURATIONS],
     is_best: [Grouped; CONFIGURATIONS],
+    route: RouteCounter,
+}
+
+/// Counters of layouts whose needle keeps away.
+#[derive(Debug, Clone, Default)]
+struct RouteCounter {
+    known: u64,
+    kept: u64,
+    at_least: [(u64, Grouped); CONFIGURATIONS],
+    configurations: [(u64, Grouped); CONFIGURATIONS],
+}
+
+impl RouteCounter {
+    fn push(&mut self, layout: &Layout, kept: bool, group: usize) {
+        self.known += 1;
+        self.kept += u64::from(kept);
+        let count = |(count, grouped): &mut (u64, Grouped), holds: bool| {
+            *count += u64::from(holds);
+            grouped.push(group, f64::from(u8::from(holds)));
+        };
+        for index in 0..CONFIGURATIONS {
+            count(&mut self.at_least[index], kept && layout.working() > index);
+            count(&mut self.configurations[index], kept && layout.works(index));
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.known += other.known;
+        self.kept += other.kept;
+        let to = self.at_least.iter_mut().chain(&mut self.configurations);
+        let from = other.at_least.iter().chain(&other.configurations);
+        for ((count, grouped), (more, others)) in to.zip(from) {
+            *count += more;
+            grouped.add(others);
+        }
+    }
 }
 
 /// Counts without allocating where the detail is known.
@@ -107,6 +183,7 @@ impl Counter {
             match row.outcome {
                 Outcome::Failed => count_detail(&mut self.failed_details[index], &row.detail, 1),
                 Outcome::Rejected => count_detail(&mut self.details[index], &row.detail, 1),
+                Outcome::NotJudged => count_detail(&mut self.open_details[index], &row.detail, 1),
                 Outcome::Ok | Outcome::Invalid => {}
             }
             self.success[index].push(group, f64::from(u8::from(layout.works(index))));
@@ -116,7 +193,13 @@ impl Counter {
         if let Some(best) = layout.best {
             self.best[best] += 1;
         }
+        if let Some(kept) = layout.keeps_away {
+            self.route.push(layout, kept, group);
+        }
         self.working[layout.working()] += 1;
+        for undecided in &mut self.undecided[layout.working()..layout.may_work()] {
+            *undecided += 1;
+        }
         for (index, grouped) in self.at_least.iter_mut().enumerate() {
             grouped.push(group, f64::from(u8::from(layout.working() > index)));
         }
@@ -138,7 +221,9 @@ impl Counter {
             add(to, from);
         }
         add(&mut self.best, &other.best);
+        add(&mut self.undecided, &other.undecided);
         add(&mut self.working, &other.working);
+        self.route.add(&other.route);
         add_details(&mut self.invalid_details, &other.invalid_details);
         for index in 0..CONFIGURATIONS {
             add_details(&mut self.details[index], &other.details[index]);
@@ -146,6 +231,7 @@ impl Counter {
                 &mut self.failed_details[index],
                 &other.failed_details[index],
             );
+            add_details(&mut self.open_details[index], &other.open_details[index]);
             self.success[index].add(&other.success[index]);
             self.at_least[index].add(&other.at_least[index]);
             self.is_best[index].add(&other.is_best[index]);
@@ -164,12 +250,32 @@ impl Counter {
 
     /// The numbers of a goal, or of all; `repeats` cases come from each sampled point, and the truth is
     /// beyond an end of an interval with the chance `tail`.
-    pub(crate) fn finish(&self, goal: Option<String>, repeats: u64, tail: f64) -> Counts {
+    pub(crate) fn finish(
+        &self,
+        goal: Option<String>,
+        repeats: u64,
+        tail: f64,
+        route_mm: Option<f64>,
+    ) -> Counts {
         let layouts: u64 = self.working.iter().sum();
-        let rate = |successes, grouped: &Grouped| {
+        let rate_of = |successes, of, grouped: &Grouped| {
             let size = grouped.effective_size(repeats, tail);
-            Rate::with_tail(successes, layouts, size, tail)
+            Rate::with_tail(successes, of, size, tail)
         };
+        let rate = |successes, grouped: &Grouped| rate_of(successes, layouts, grouped);
+        let rates = |all: &[(u64, Grouped)]| {
+            all.iter()
+                .map(|(successes, grouped)| rate_of(*successes, self.route.known, grouped))
+                .collect()
+        };
+        let with_route = route_mm.filter(|_| self.route.known > 0);
+        let with_route = with_route.map(|least_mm| WithRoute {
+            least_mm,
+            known: self.route.known,
+            kept: self.route.kept,
+            at_least: rates(&self.route.at_least),
+            configurations: rates(&self.route.configurations),
+        });
         let configurations = Configuration::ALL.iter().enumerate();
         Counts {
             goal,
@@ -180,6 +286,8 @@ impl Counter {
             at_least: (1..=CONFIGURATIONS)
                 .map(|k| rate(self.working[k..].iter().sum(), &self.at_least[k - 1]))
                 .collect(),
+            undecided: self.undecided.to_vec(),
+            with_route,
             working: self.working.to_vec(),
             configurations: configurations
                 .map(|(index, configuration)| {
@@ -189,11 +297,13 @@ impl Counter {
                         ok: outcome(Outcome::Ok),
                         failed: outcome(Outcome::Failed),
                         rejected: outcome(Outcome::Rejected),
+                        not_judged: outcome(Outcome::NotJudged),
                         best: self.best[index],
                         success: rate(outcome(Outcome::Ok), &self.success[index]),
                         details: sorted([
                             (Outcome::Failed, &self.failed_details[index]),
                             (Outcome::Rejected, &self.details[index]),
+                            (Outcome::NotJudged, &self.open_details[index]),
                         ]),
                     }
                 })

@@ -11,6 +11,10 @@ pub(crate) const CONFIGURATIONS: usize = 8;
 pub(crate) struct Layout {
     /// Configurations that are ok, as bits.
     pub ok: u8,
+    /// Configurations that were not judged, as bits.
+    pub not_judged: u8,
+    /// Whether the needle keeps away from bone, vessels and organs, where that is asked about and known.
+    pub keeps_away: Option<bool>,
     /// Configuration with the largest clearance of those that are ok; the first of equal ones.
     pub best: Option<usize>,
     /// Its clearance, mm.
@@ -26,6 +30,8 @@ impl Layout {
     pub(crate) fn of(result: &CaseResult, measures: &Measures) -> Option<Self> {
         let mut layout = Self {
             ok: 0,
+            not_judged: 0,
+            keeps_away: measures.keeps_away(&result.rows),
             best: None,
             best_clearance: None,
             best_tip_error: None,
@@ -36,6 +42,10 @@ impl Layout {
                 Outcome::Invalid => return None,
                 Outcome::Ok => layout.ok |= 1 << index,
                 Outcome::Failed | Outcome::Rejected => continue,
+                Outcome::NotJudged => {
+                    layout.not_judged |= 1 << index;
+                    continue;
+                }
             }
             let tip_error = measures.tip_error(row);
             if let Some(clearance) = measures.clearance(row)
@@ -57,6 +67,11 @@ impl Layout {
     /// Number of configurations that are ok.
     pub(crate) fn working(&self) -> usize {
         self.ok.count_ones() as usize
+    }
+
+    /// Number of configurations that are ok or were not judged.
+    pub(crate) fn may_work(&self) -> usize {
+        (self.ok | self.not_judged).count_ones() as usize
     }
 
     /// Whether a configuration is ok.
@@ -84,7 +99,10 @@ impl BestConfiguration {
 
 /// Whether a row's numbers are of a configuration that was not rejected.
 pub(crate) fn has_numbers(row: &Row) -> bool {
-    matches!(row.outcome, Outcome::Ok | Outcome::Failed)
+    matches!(
+        row.outcome,
+        Outcome::Ok | Outcome::Failed | Outcome::NotJudged
+    )
 }
 
 /// Visits all cases and refuses such as do not fit the factors.

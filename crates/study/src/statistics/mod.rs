@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 
 pub use axis::{Axis, Bin};
 pub use choices::{Choice, ChoiceRanking, Difference};
-pub use counts::{ConfigurationCounts, Counts, DetailCount};
+pub use counts::{ConfigurationCounts, Counts, DetailCount, WithRoute};
 pub use effects::{BinMean, Effects, Interaction, MainEffect, ResponseEffects};
 pub use evidence::{CaseValue, ConfigurationEvidence, Evidence, MOST_CASES, WorstCases};
 pub use gap::{ANY, Gap, ReplannedCase, gaps};
@@ -85,6 +85,9 @@ pub struct SummaryOptions {
     pub more_quantiles: Vec<f64>,
     /// Whether to give effects, maps and the ranking of choices.
     pub factors: bool,
+    /// How far needles are to keep away from bone, vessels and organs, mm, where that is no part of what works: rates are
+    /// then given with it and without.
+    pub route_mm: Option<f64>,
 }
 
 impl Default for SummaryOptions {
@@ -95,6 +98,7 @@ impl Default for SummaryOptions {
             ranked_configurations: 1,
             more_quantiles: Vec::new(),
             factors: true,
+            route_mm: None,
         }
     }
 }
@@ -259,7 +263,8 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
         Some(Err(message)) => (None, Some(message)),
     };
 
-    visit_goals(results, |goal, values, result, layout| {
+    let measures = Measures::new(columns).with_route(columns, options.route_mm);
+    visit_goals(results, &measures, |goal, values, result, layout| {
         let group = points.group(values);
         counters[goal].push(result, layout, group);
         evidence.push(result, layout);
@@ -287,7 +292,7 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
     let mut interactions = Interactions::new(paired.collect(), &main);
     let mut regions = RegionCounter::new(coarse, strongest.clone());
     for pass in 1..PASSES {
-        visit_goals(results, |_, values, result, layout| {
+        visit_goals(results, &measures, |_, values, result, layout| {
             if let Some(choices) = &mut choices {
                 choices.push(values, result, layout, 0, pass);
             }
@@ -317,8 +322,14 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
         repeats: points.repeats,
         of_choice: None,
         not_ranked: too_many,
-        overall: all.finish(None, points.repeats, TAIL),
-        goals: by_goal(goals.clone(), &counters, points.repeats, TAIL),
+        overall: all.finish(None, points.repeats, TAIL, options.route_mm),
+        goals: by_goal(
+            goals.clone(),
+            &counters,
+            points.repeats,
+            TAIL,
+            options.route_mm,
+        ),
         over_all_choices: None,
         metrics: columns.iter().filter(|each| each.spread).cloned().collect(),
         spreads: spreads.finish(columns),
@@ -337,7 +348,14 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
                 counter,
                 cell: first,
             };
-            narrow(&mut summary, &of_best, &ranking, goals, probabilities)?;
+            narrow(
+                &mut summary,
+                &of_best,
+                &ranking,
+                goals,
+                probabilities,
+                options.route_mm,
+            )?;
         }
         summary.choices = Some(ranking);
     }
@@ -347,11 +365,17 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
     Ok(summary)
 }
 
-fn by_goal(goals: Vec<String>, counters: &[Counter], repeats: u64, tail: f64) -> Vec<Counts> {
+fn by_goal(
+    goals: Vec<String>,
+    counters: &[Counter],
+    repeats: u64,
+    tail: f64,
+    route_mm: Option<f64>,
+) -> Vec<Counts> {
     let per_goal = repeats / goals.len().max(1) as u64;
     let goals = goals.into_iter().zip(counters);
     goals
-        .map(|(goal, counter)| counter.finish(Some(goal), per_goal, tail))
+        .map(|(goal, counter)| counter.finish(Some(goal), per_goal, tail, route_mm))
         .collect()
 }
 
@@ -394,6 +418,7 @@ fn narrow(
     ranking: &ChoiceRanking,
     goals: Vec<String>,
     probabilities: Vec<f64>,
+    route_mm: Option<f64>,
 ) -> Result<(), ResultsError> {
     let number = ranking.choices.len() as u64;
     let tail = TAIL / number as f64;
@@ -402,8 +427,9 @@ fn narrow(
     let mut counters = vec![Counter::default(); goals.len()];
     let mut spreads = Spreads::new(Rc::from(probabilities), points.repeats, tail, columns);
     let mut evidence = Collector::new(columns);
+    let measures = Measures::new(columns).with_route(columns, route_mm);
     for pass in 0..PASSES {
-        visit_goals(results, |goal, values, result, layout| {
+        visit_goals(results, &measures, |goal, values, result, layout| {
             if pass == 0 {
                 counters[goal].push(result, layout, points.group(values));
                 evidence.push(result, layout);
@@ -422,9 +448,9 @@ fn narrow(
         let against = &choice.against_first;
         against.as_ref().is_some_and(|found| !found.distinguishable)
     });
-    let overall = all.finish(None, points.repeats, tail);
+    let overall = all.finish(None, points.repeats, tail, route_mm);
     summary.over_all_choices = Some(std::mem::replace(&mut summary.overall, overall));
-    summary.goals = by_goal(goals, &counters, points.repeats, tail);
+    summary.goals = by_goal(goals, &counters, points.repeats, tail, route_mm);
     summary.spreads = spreads.finish(columns);
     summary.evidence = evidence.finish();
     summary.repeats = points.repeats;
@@ -442,15 +468,15 @@ fn narrow(
 /// Visits all cases with their goals.
 fn visit_goals(
     results: &dyn Results,
+    measures: &Measures,
     mut visit: impl FnMut(usize, &[FactorValue], &crate::CaseResult, Option<&Layout>),
 ) -> Result<(), ResultsError> {
-    let measures = Measures::new(results.columns());
     layout::visit_checked(results, |values, result| {
         let goal = match values.first() {
             Some(FactorValue::Level(level)) => *level,
             _ => 0,
         };
-        let layout = Layout::of(result, &measures);
+        let layout = Layout::of(result, measures);
         visit(goal, values, result, layout.as_ref());
     })
 }

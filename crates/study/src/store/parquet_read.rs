@@ -348,7 +348,7 @@ impl ParquetResults {
                         for text in texts {
                             let same = |outcome: &Outcome| outcome.name().as_bytes() == text.data();
                             let index = Outcome::ALL.iter().position(same);
-                            let index = u8::try_from(index_of(index)?).expect("four outcomes");
+                            let index = u8::try_from(index_of(index)?).expect("few outcomes");
                             cases.outcomes.push(index);
                         }
                     }

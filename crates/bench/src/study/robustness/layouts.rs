@@ -144,7 +144,7 @@ impl<'a> Layouts<'a> {
                 }
                 Verdict::Holds
             }
-            Outcome::Failed | Outcome::Rejected => Verdict::Breaks,
+            Outcome::Failed | Outcome::Rejected | Outcome::NotJudged => Verdict::Breaks,
             Outcome::Invalid => Verdict::Impossible,
         })
     }

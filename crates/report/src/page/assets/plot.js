@@ -150,6 +150,7 @@ NB.classStyle = {
   robot_gantry: { color: NB.palette.sky, dash: [] },
   robot_mount: { color: NB.palette.green, dash: [] },
   robot_obstacle: { color: NB.palette.green, dash: [3, 3] },
+  robot_person: { color: NB.palette.blue, dash: [3, 3] },
   self: { color: NB.palette.purple, dash: [] },
   needle_corridor: { color: NB.palette.grey, dash: [6, 3] },
   needle_route: { color: NB.palette.black, dash: [2, 4] },

@@ -421,6 +421,8 @@ class Statistics {
         .map((detail) => `${this.reason(detail)} ${NB.fixed((100 * detail.count) / (counts.layouts || 1), 1)} %`)
         .join(', ');
     const layouts = counts.layouts ?? counts.cases - counts.invalid;
+    /** @param {ConfigurationCounts} c */
+    const notJudged = (c) => NB.grouped(c.not_judged);
     return NB.table(
       `${counts.goal ? `Goal ${NB.words(counts.goal)}` : 'All goals'}: ${NB.grouped(layouts)} ` +
         `layouts${counts.invalid ? `, ${NB.grouped(counts.invalid)} more cannot exist` : ''}`,
@@ -430,6 +432,9 @@ class Statistics {
         { title: 'Works', numeric: true, cell: (c) => NB.grouped(c.ok) },
         { title: 'Misses a criterion', numeric: true, cell: (c) => NB.grouped(c.failed) },
         { title: 'Rejected', numeric: true, cell: (c) => NB.grouped(c.rejected) },
+        ...(counts.configurations.some((c) => c.not_judged)
+          ? [{ title: 'Not judged', numeric: true, cell: notJudged }]
+          : []),
         {
           title: 'Best',
           numeric: true,

@@ -111,7 +111,7 @@ class StudyPage extends StudyPlots {
   /** Verdict, cases, and what has to be known of every figure below. */
   head() {
     const { cases, kept } = this.page;
-    const { criteria = [], verdict, not_judged: open = [], postures_only: postures } = this.summary;
+    const { criteria = [], verdict, not_judged: open = [] } = this.summary;
     const varied = this.factors
       .filter((factor) => !factor.levels || factor.levels.length > 1)
       .map((factor) => (factor.levels ? `${factor.words} (${factor.levels.length})` : factor.words));
@@ -120,7 +120,7 @@ class StudyPage extends StudyPlots {
       { class: 'bar' },
       criteria.length || open.length
         ? NB.verdict(String(verdict))
-        : NB.el('span', { class: 'chip off', text: 'no criteria: nothing is judged' }),
+        : NB.el('span', { class: 'chip off', text: 'no verdict: the study has no criteria' }),
       open.length ? NB.el('span', { class: 'error', text: `not judged: ${open.join('; ')}` }) : null,
       this.posturesChip(),
       NB.el('span', { text: `${NB.grouped(cases)} cases, each with 8 configurations; varied: ${varied.join(', ')}` }),
@@ -131,7 +131,7 @@ class StudyPage extends StudyPlots {
               'rule, and those that the statistics name. All tables of statistics are of all cases.',
           })
         : null,
-      postures && postures !== 'none' && this.summary.headline
+      this.summary.headline
         ? NB.el('p', {
             class: 'headline',
             text: `${this.summary.headline.charAt(0).toUpperCase()}${this.summary.headline.slice(1)}.`,
@@ -144,7 +144,9 @@ class StudyPage extends StudyPlots {
   posturesChip() {
     const words = { all: 'postures only: no motion is planned', some: 'some cases are postures only', none: '' };
     const text = words[this.summary.postures_only || 'none'];
-    return text ? NB.el('span', { class: 'chip bad', text, title: this.summary.headline || null }) : null;
+    const route = this.summary.without_route ? 'needle route left out' : '';
+    const chips = [text, route].filter(Boolean);
+    return chips.map((each) => NB.el('span', { class: 'chip bad', text: each, title: this.summary.headline || null }));
   }
 
   /** @param {HTMLElement} app */
@@ -768,9 +770,15 @@ class StudyPage extends StudyPlots {
   /** @param {number} index @param {number} c */
   outcomeText(index, c) {
     const [outcome, , words] = this.page.outcomeNames[this.outcomes[c * this.count + index]];
-    const style = { ok: 'good', failed: 'bad', rejected: 'off', invalid: 'off' }[outcome];
-    const sign = { ok: '\u2713', failed: '\u2717', rejected: '\u2013', invalid: '\u2205' }[outcome];
-    const name = { ok: 'works', failed: 'misses a criterion', rejected: 'rejected', invalid: 'cannot exist' }[outcome];
+    const style = { ok: 'good', failed: 'bad', rejected: 'off', invalid: 'off', not_judged: 'off' }[outcome];
+    const sign = { ok: '\u2713', failed: '\u2717', rejected: '\u2013', invalid: '\u2205', not_judged: '?' }[outcome];
+    const name = {
+      ok: 'works',
+      failed: 'misses a criterion',
+      rejected: 'rejected',
+      invalid: 'cannot exist',
+      not_judged: 'not judged',
+    }[outcome];
     return [
       NB.el('span', { class: style, text: `${sign} ${name}` }),
       words ? NB.el('div', { class: 'soft', text: words }) : '',

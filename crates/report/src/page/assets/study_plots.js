@@ -58,10 +58,11 @@ class StudyPlots {
    */
   coloring() {
     const { color } = this.state;
-    const [blue, red, orange, grey] = [
+    const [blue, red, orange, violet, grey] = [
       [0, 114, 178],
       [213, 94, 0],
       [230, 159, 0],
+      [120, 94, 240],
       [150, 150, 150],
     ];
     if (color === 'outcome') {
@@ -77,6 +78,7 @@ class StudyPlots {
               ['ok', blue, 'square', 'works'],
               ['failed', orange, 'triangle', 'misses a criterion'],
               ['rejected', red, 'cross', 'rejected'],
+              ['not_judged', violet, 'triangle', 'not judged'],
               ['invalid', grey, 'dot', 'cannot exist'],
             ];
       const at = new Map(kinds.map(([name], index) => [name, index]));
@@ -522,7 +524,7 @@ class StudyPlots {
   sort() {
     if (this.sorted) return this.sorted;
     const metric = this.metric(this.state.metric);
-    const counted = this.outcomeOf.map((name) => name === 'ok' || name === 'failed');
+    const counted = this.outcomeOf.map((name) => ['ok', 'failed', 'not_judged'].includes(name));
     this.sorted = this.page.configurations.map((_, c) => {
       const values = new Float32Array(this.indices.length);
       let n = 0;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use needlebench_cell::reason_in_words;
 use needlebench_study::statistics::{
     BinMean, ChoiceRanking, ChosenChoice, Interval, Rate, Summary,
 };
@@ -157,11 +158,13 @@ impl Answer {
             comparisons(summary, factors)
         };
         let mut remarks = Vec::new();
-        let sentence = if summary.overall.layouts == 0 {
+        let mut sentence = if summary.overall.layouts == 0 {
             format!(
                 "no answer: none of the {} layouts can exist",
                 summary.overall.cases
             )
+        } else if let Some(why) = nothing_judged(summary, working) {
+            why
         } else if let Some(why) = &summary.not_ranked {
             format!("no answer: {why}")
         } else if let (Some(ranking), Some(best)) = (&summary.choices, &summary.of_choice) {
@@ -170,6 +173,12 @@ impl Answer {
         } else {
             of_circumstances(summary, &compared, working, &mut remarks)
         };
+        if !sentence.starts_with("no answer") {
+            remarks.splice(0..0, not_judged_in_words(summary, working));
+            if let Some(with_route) = with_route_in_words(summary, working) {
+                let _ = write!(sentence, "; {with_route}");
+            }
+        }
         remarks.extend(small(&summary.overall.at_least[working - 1]));
         Self {
             sentence,
@@ -179,12 +188,74 @@ impl Answer {
     }
 }
 
+/// Why there is no answer where no layout could be judged.
+fn nothing_judged(summary: &Summary, working: usize) -> Option<String> {
+    let undecided = undecided(summary, working);
+    let mut configurations = summary.overall.configurations.iter();
+    let judged = configurations.any(|each| each.ok > 0 || each.failed > 0);
+    (undecided > 0 && !judged).then(|| {
+        format!(
+            "no answer: none of the {undecided} layouts in which something may work could be judged ({})",
+            open_reasons(summary)
+        )
+    })
+}
+
+/// Layouts of which it is not known whether they work.
+fn undecided(summary: &Summary, working: usize) -> u64 {
+    let undecided = &summary.overall.undecided;
+    undecided.get(working - 1).copied().unwrap_or_default()
+}
+
+/// What was not judged, the most frequent first: `engine failure rapier`.
+fn open_reasons(summary: &Summary) -> String {
+    let mut counts: Vec<(&str, u64)> = summary.overall.not_judged().into_iter().collect();
+    counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let texts: Vec<String> = counts
+        .into_iter()
+        .take(NAMED_EQUALS)
+        .map(|(detail, count)| format!("{}: {count} motions", reason_in_words(detail)))
+        .collect();
+    texts.join(", ")
+}
+
+/// What a share of layouts leaves out where some were not judged.
+fn not_judged_in_words(summary: &Summary, working: usize) -> Option<String> {
+    let undecided = undecided(summary, working);
+    let layouts = summary.overall.layouts;
+    (undecided > 0).then(|| {
+        let most = summary.overall.at_least[working - 1].successes + undecided;
+        format!(
+            "{undecided} of {layouts} layouts were not judged ({}) and count as not working: were they all to work, \
+             it would be {} %",
+            open_reasons(summary),
+            in_percent(most as f64 / layouts as f64)
+        )
+    })
+}
+
 /// `at least one configuration works`.
 fn works_in_words(working: usize) -> String {
     match working {
         1 => "at least one configuration works".to_owned(),
         count => format!("at least {count} configurations work"),
     }
+}
+
+/// How many layouts work whose needle keeps away too, where that is left out of what works.
+fn with_route_in_words(summary: &Summary, working: usize) -> Option<String> {
+    let route = summary.overall.with_route.as_ref()?;
+    let rate = &route.at_least[working - 1];
+    let interval = rate
+        .interval
+        .map_or(String::new(), |each| format!(" ({})", percents(each)));
+    Some(format!(
+        "in {} %{interval} the needle keeps {} mm from bone, vessel and organ too, and {} of {} pass nearer",
+        rate.rate.map_or("-".to_owned(), in_percent),
+        three_digits(route.least_mm),
+        route.known - route.kept,
+        route.known
+    ))
 }
 
 /// `in 98.2 % of 512 layouts (95 % interval 95.0 to 99.6 %`, without the last bracket.

@@ -1,12 +1,12 @@
 //! How often each configuration works, how near it comes to anything, and what is in its way.
 
 use needlebench_cell::reason_in_words;
-use needlebench_study::statistics::{BEST, ConfigurationCounts, Summary};
+use needlebench_study::statistics::{BEST, ConfigurationCounts, Rate, Summary};
 use needlebench_study::{Measure, MetricColumn};
 
 use super::answer::{Answer, has_tip_errors, spaced};
 use super::block::{MOST_REASONS, or_dash, rate_text};
-use crate::number::in_percent;
+use crate::number::{in_percent, three_digits};
 use crate::table::Block;
 
 /// Share of the layouts below which a reason is not worth a word on the first screen.
@@ -32,14 +32,18 @@ pub(super) fn configurations_first(summary: &Summary, answer: &Answer, blocks: &
     let clearance = most_measured(summary, Measure::Clearance);
     let error = most_measured(summary, Measure::TipError).filter(|_| has_tip_errors(summary));
     let mut header = vec!["configuration", "works (%)\nof layouts"];
+    let route = summary.overall.with_route.as_ref();
+    if route.is_some() {
+        header.push("with\nroute (%)");
+    }
     if clearance.is_some() {
         header.push("clearance\n5 % (mm)");
     }
     if error.is_some() {
         header.push("tip error\n95 % (mm)");
     }
-    // What is in the way, where errors leave room for it.
-    let with_reason = error.is_none();
+    // What is in the way, where errors and routes leave room for it.
+    let with_reason = error.is_none() && route.is_none();
     if with_reason {
         header.push("<mostly not, as");
     }
@@ -56,8 +60,13 @@ pub(super) fn configurations_first(summary: &Summary, answer: &Answer, blocks: &
         .overall
         .configurations
         .iter()
-        .map(|each| {
-            let mut row = vec![each.label.clone(), rate_text(&each.success)];
+        .enumerate()
+        .map(|(index, each)| {
+            let mut row = vec![
+                each.label.clone(),
+                known_rate(&each.success, each.not_judged),
+            ];
+            row.extend(route.map(|route| share(&route.configurations[index])));
             row.extend(numbers(&each.label));
             let mut most = each.details.first().into_iter();
             let most = most.find(|first| first.count as f64 >= WORTH_A_WORD * layouts);
@@ -71,8 +80,17 @@ pub(super) fn configurations_first(summary: &Summary, answer: &Answer, blocks: &
         .collect();
     let mut best = vec![
         "best of each".to_owned(),
-        rate_text(&summary.overall.at_least[0]),
+        known_rate(
+            &summary.overall.at_least[0],
+            summary
+                .overall
+                .undecided
+                .first()
+                .copied()
+                .unwrap_or_default(),
+        ),
     ];
+    best.extend(route.map(|route| share(&route.at_least[0])));
     best.extend(numbers(BEST));
     best.extend(with_reason.then(String::new));
     rows.push(best);
@@ -97,10 +115,31 @@ pub(super) fn configurations_first(summary: &Summary, answer: &Answer, blocks: &
         header: header.into_iter().map(str::to_owned).collect(),
         rows,
     });
-    blocks.push(Block::Lines(vec![
+    let mut below = vec![
         "clearance: 5 % of the layouts have less; best: of those that work, with the largest clearance"
             .to_owned(),
-    ]));
+    ];
+    below.extend(route.map(|route| {
+        format!(
+            "with route: works, and the needle keeps {} mm from bone, vessel and organ",
+            three_digits(route.least_mm)
+        )
+    }));
+    blocks.push(Block::Lines(below));
+}
+
+/// A rate with its interval, or where some were not judged between what it is.
+fn known_rate(rate: &Rate, not_judged: u64) -> String {
+    if not_judged == 0 || rate.of == 0 {
+        return rate_text(rate);
+    }
+    let [low, high] = [rate.successes, rate.successes + not_judged]
+        .map(|count| in_percent(count as f64 / rate.of as f64));
+    format!("{low} to {high}, not judged")
+}
+
+fn share(rate: &Rate) -> String {
+    rate.rate.map_or("-".to_owned(), in_percent)
 }
 
 fn reason(detail: &str, count: u64, layouts: f64) -> String {

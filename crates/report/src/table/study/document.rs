@@ -103,7 +103,11 @@ fn that_cannot_exist(summary: &Summary) -> Option<String> {
 
 /// `postures only: ...` with its warning in capitals.
 fn capital(headline: &str) -> String {
-    headline.replacen("postures", "POSTURES", 1)
+    headline.replacen("postures", "POSTURES", 1).replacen(
+        "needle route left out",
+        "NEEDLE ROUTE left out",
+        1,
+    )
 }
 
 fn overview(summary: &Summary) -> Vec<String> {

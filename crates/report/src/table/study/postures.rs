@@ -39,6 +39,32 @@ impl Postures {
     }
 }
 
+/// What the base scenario lets needles pass through, of bone, vessels and organs: it is no part of what works.
+pub(crate) struct RouteLeftOut {
+    /// What is switched off, as the scenario names it.
+    off: Vec<String>,
+    /// The margin that would hold, mm.
+    pub least_mm: f64,
+}
+
+impl RouteLeftOut {
+    /// Of a study; none where the needle's route is judged.
+    pub(crate) fn of(prepared: &PreparedStudy) -> Option<Self> {
+        let route = &prepared.study.family.base().scenario.planning.needle_route;
+        (!route.off.is_empty()).then(|| Self {
+            off: route.off.clone(),
+            least_mm: route.bone_mm.max(route.vessel_mm).max(route.organ_mm),
+        })
+    }
+
+    pub(crate) fn in_words(&self) -> String {
+        format!(
+            "needle route left out: needles may pass {} (`planning.needle_route.off`), and work all the same",
+            self.off.join(", ")
+        )
+    }
+}
+
 /// The first sentence of a study of postures, wherever it is shown.
 pub(crate) fn postures_headline(postures: Postures, found: Option<&Replanned>) -> Option<String> {
     let what = match postures {

@@ -689,6 +689,7 @@ interface StudySummary {
   headline?: string | null;
   confidence?: number;
   postures_only?: 'all' | 'some' | 'none';
+  without_route?: boolean;
   not_judged?: string[];
   study_id?: string;
   sampling?: string;
@@ -789,6 +790,7 @@ interface ConfigurationCounts {
   ok: number;
   failed: number;
   rejected: number;
+  not_judged: number;
   best: number;
   details?: { detail: string; count: number }[];
 }

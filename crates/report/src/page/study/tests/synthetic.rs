@@ -104,7 +104,7 @@ impl Synthetic {
             };
             let detail = match outcome {
                 Outcome::Ok => "",
-                Outcome::Failed => "min_clearance_mm.robot_phantom",
+                Outcome::Failed | Outcome::NotJudged => "min_clearance_mm.robot_phantom",
                 Outcome::Rejected => "collision robot_phantom",
                 Outcome::Invalid => "phantom.position_mm",
             };
