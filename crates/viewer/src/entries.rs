@@ -47,17 +47,7 @@ pub fn entries(
 ) -> Result<Option<Entries>, Refusal> {
     let section = aim.section(case)?;
     let usual = RouteSection::default();
-    let task = RouteTask {
-        resolved: case.desk().scenario(),
-        section: &section,
-        rules: rules_of(case, &section, &usual),
-        // Asked now or later: the rules are the same.
-        robot: match case.built().not_registered() {
-            Some(why) => WithRobot::No(why.to_owned()),
-            None => WithRobot::Yes,
-        },
-        directions: VOXEL_DIRECTIONS,
-    };
+    let task = task_of(case, &section, &usual);
     let around = match around(case, &task, &section, control) {
         Ok(around) => around,
         Err(VoxelsError::Scan(ImagingError::Interrupted)) => return Ok(None),
@@ -91,6 +81,37 @@ pub fn entries(
         Err(SuggestError::Interrupted) => Ok(None),
         Err(SuggestError::Refused { message, hint }) => Err(Refusal::new(message, &hint)),
     }
+}
+
+fn task_of<'a>(case: &'a Case, section: &'a GoalSection, usual: &'a RouteSection) -> RouteTask<'a> {
+    RouteTask {
+        resolved: case.desk().scenario(),
+        section,
+        rules: rules_of(case, section, usual),
+        // Asked now or later: the rules are the same.
+        robot: match case.built().not_registered() {
+            Some(why) => WithRobot::No(why.to_owned()),
+            None => WithRobot::Yes,
+        },
+        directions: VOXEL_DIRECTIONS,
+    }
+}
+
+/// Reads the voxels around a target, so that a needle to it is judged by the rules of routes even if nobody has asked
+/// for entries. A target that has none is judged by its tissues alone.
+///
+/// # Errors
+/// A target that is none.
+pub(crate) fn look_around(
+    case: &Case,
+    aim: &GoalAim,
+    control: &Control<'_>,
+) -> Result<(), Refusal> {
+    let section = aim.section(case)?;
+    let usual = RouteSection::default();
+    let _judged_by_tissues_if_not =
+        around(case, &task_of(case, &section, &usual), &section, control);
+    Ok(())
 }
 
 /// The voxels around a target: those of the last question if it was about the same.

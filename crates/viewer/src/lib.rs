@@ -13,6 +13,7 @@ mod around;
 mod case;
 pub mod entries;
 mod guard;
+mod listen;
 pub mod live;
 pub mod motion;
 mod page;

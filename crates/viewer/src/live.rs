@@ -174,6 +174,8 @@ pub struct RouteAnswer {
     pub fissures: Vec<String>,
     /// How the rules of routes judge it; none until they were asked about its target.
     pub judged: Option<Judged>,
+    /// Why no run allows it, in words; none where nothing that was judged refuses it.
+    pub refusal: Option<String>,
 }
 
 /// Which configurations serve.
@@ -244,7 +246,8 @@ pub fn needle(case: &Case, aim: &Aim) -> Result<Needle, Refusal> {
 }
 
 impl Aim {
-    fn goal_aim(&self) -> GoalAim {
+    /// What it is for.
+    pub(crate) fn goal_aim(&self) -> GoalAim {
         GoalAim {
             goal: self.goal.clone(),
             target: self.target.clone(),
@@ -334,7 +337,7 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
         .count();
     let goal = needle.goal.as_ref().ok();
     let judged = goal.map(|goal| judged_tissues(resolved, placed, goal));
-    let tissues = judged
+    let tissues: Vec<TissueAnswer> = judged
         .into_iter()
         .flatten()
         .map(|judged| {
@@ -350,7 +353,13 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
             }
         })
         .collect();
+    let by_rules = case.last_target().judged(
+        &needle.section.name,
+        &case.in_phantom(&needle.target_m),
+        &-inwards,
+    );
     Ok(RouteAnswer {
+        refusal: refusal(&tissues, by_rules.as_ref()),
         entry_m: needle.entry_m.coords.into(),
         entry_index: grid.index_from_ct(&needle.entry_m).coords.into(),
         target_m: needle.target_m.coords.into(),
@@ -370,12 +379,33 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
         fissures: goal
             .map(|goal| crossed_fissures(resolved, goal))
             .unwrap_or_default(),
-        judged: case.last_target().judged(
-            &needle.section.name,
-            &case.in_phantom(&needle.target_m),
-            &-inwards,
-        ),
+        judged: by_rules,
     })
+}
+
+/// The tissue whose margin is missed most, or else the rule of routes that is broken.
+fn refusal(tissues: &[TissueAnswer], judged: Option<&Judged>) -> Option<String> {
+    let missed_m = |each: &TissueAnswer| each.distance_m - each.margin_m;
+    let refused = tissues.iter().filter(|each| !each.kept);
+    if let Some(TissueAnswer {
+        tissue,
+        words,
+        distance_m,
+        margin_m,
+        ..
+    }) = refused.min_by(|a, b| missed_m(a).total_cmp(&missed_m(b)))
+    {
+        let [mm, wanted_mm] = [distance_m, margin_m].map(|metres| 1e3 * metres);
+        return Some(if mm < 0.0 {
+            format!("it goes {:.1} mm deep through {words} ({tissue})", -mm)
+        } else {
+            format!(
+                "it passes {words} ({tissue}) at {mm:.1} mm, and {wanted_mm:.1} mm are to be kept"
+            )
+        });
+    }
+    let broken = judged.and_then(|judged| judged.broken)?;
+    Some(format!("by the rules of routes: {broken}"))
 }
 
 fn surface_p99_m(case: &Case, part: &str) -> Option<f64> {

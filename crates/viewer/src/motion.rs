@@ -159,6 +159,7 @@ fn planned_desk<'c>(case: &'c Case, aim: &Aim) -> Result<&'c Desk, Refusal> {
             case,
             aim,
             None,
+            None,
             &case.folder().join(crate::plan_file::PLAN_FILE),
         )?;
         Desk::new(plan.resolved).map_err(|error| Refusal {

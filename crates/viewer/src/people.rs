@@ -33,7 +33,7 @@ pub fn people(case: &Case, aim: &Aim, joints_rad: &[f64; 6]) -> Result<PeopleAns
             "send those of the planned motion",
         ));
     }
-    let plan = planned(case, aim, None, &case.folder().join(PLAN_FILE))?;
+    let plan = planned(case, aim, None, None, &case.folder().join(PLAN_FILE))?;
     let model = RoomModel::new(&plan.resolved);
     let q = Joints::from_column_slice(joints_rad);
     Ok(PeopleAnswer {

@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use needlebench_bench::Runnable;
+use needlebench_bench::{Control, Runnable};
 use needlebench_cell::scenario::GoalSection;
 use needlebench_cell::{Finding, ResolvedScenario, ScenarioEdit, read_text, resolve_scenario};
 use needlebench_report::write_atomically;
+use serde::Deserialize;
 
 use crate::case::Case;
-use crate::live::{Aim, Refusal, needle};
+use crate::entries::look_around;
+use crate::live::{Aim, Refusal, needle, route};
 use needlebench_bench::ct::SCENARIO_FILE;
 
 /// Its name, unless somebody gives it another.
@@ -30,31 +32,109 @@ pub struct Planned {
     pub left_out: Vec<String>,
 }
 
-/// Writes the plan into the case's folder as `NAME.toml`; the path, and the goals that it does not have.
+/// What somebody was asked before a plan is written, and agreed to.
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Consent {
+    /// A file of another text may be overwritten.
+    pub overwrite: bool,
+    /// The needle may be one that is refused; the file says so.
+    pub refused: bool,
+}
+
+/// A plan that was written.
+#[derive(Debug, Clone)]
+pub struct Written {
+    /// Its file.
+    pub path: PathBuf,
+    /// Goals of the folder that it does not have.
+    pub left_out: Vec<String>,
+    /// Why its needle is not allowed, where it is not.
+    pub refusal: Option<String>,
+}
+
+/// Why a plan was not written.
+#[derive(Debug, Clone)]
+pub enum NotWritten {
+    /// It cannot be.
+    Refused(Refusal),
+    /// There is a file of its name with another text.
+    Exists {
+        /// The file.
+        file: String,
+        /// A name that no file has.
+        free: String,
+    },
+    /// The needle is not allowed.
+    NotAllowed(String),
+}
+
+impl From<Refusal> for NotWritten {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(refusal)
+    }
+}
+
+/// Writes the plan into the case's folder as `NAME.toml`.
 ///
-/// What is written is what [`needlebench run`] takes: it is resolved and checked before.
+/// What is written is what [`needlebench run`] takes: it is resolved and checked before. Of a needle that is not allowed
+/// it says so in the file.
 ///
 /// # Errors
-/// A name that is none; what keeps the plan from being run; a file that cannot be written.
+/// A name that is none; what keeps the plan from being run; a file that cannot be written; what nobody has agreed to.
 pub fn write_plan(
     case: &Case,
     aim: &Aim,
     configuration: Option<&str>,
     name: &str,
-) -> Result<(PathBuf, Vec<String>), Refusal> {
-    let path = case.folder().join(file_name(name)?);
-    let plan = planned(case, aim, configuration, &path)?;
-    Runnable::checked(plan.resolved)?;
+    consent: Consent,
+    control: &Control<'_>,
+) -> Result<Written, NotWritten> {
+    let file = file_name(name)?;
+    let path = case.folder().join(&file);
+    look_around(case, &aim.goal_aim(), control)?;
+    let refusal = route(case, aim)?.refusal;
+    if let Some(refusal) = refusal.as_ref().filter(|_| !consent.refused) {
+        return Err(NotWritten::NotAllowed(refusal.clone()));
+    }
+    let plan = planned(case, aim, configuration, refusal.as_deref(), &path)?;
+    Runnable::checked(plan.resolved).map_err(Refusal::from)?;
+    if !consent.overwrite && path.exists() && read_text(&path).ok().as_ref() != Some(&plan.text) {
+        return Err(NotWritten::Exists {
+            free: free_name(case.folder(), &file),
+            file,
+        });
+    }
     write_atomically(&path, plan.text.as_bytes()).map_err(|error| Refusal {
         message: format!("the plan cannot be written: {error}"),
         hint: Some(
             "the folder may have been moved or deleted since the page was opened".to_owned(),
         ),
     })?;
-    Ok((path, plan.left_out))
+    Ok(Written {
+        path,
+        left_out: plan.left_out,
+        refusal,
+    })
 }
 
-/// The text of the plan for a file, and what it is as a scenario. Other goals of the folder that nobody has given an entry
+/// `planned-2` where there is a `planned.toml`.
+fn free_name(folder: &Path, file: &str) -> String {
+    let stem = file.strip_suffix(".toml").unwrap_or(file);
+    let base = stem.rsplit_once('-').map_or(stem, |(base, number)| {
+        if number.parse::<u32>().is_ok() {
+            base
+        } else {
+            stem
+        }
+    });
+    (2..u32::MAX)
+        .map(|number: u32| format!("{base}-{number}"))
+        .find(|name| !folder.join(format!("{name}.toml")).exists())
+        .expect("a folder has few files")
+}
+
+/// The text of the plan for a file, with why its needle is not allowed if it is not, and what it is as a scenario. Other goals of the folder that nobody has given an entry
 /// are left out: a plan has the needles that were planned.
 ///
 /// # Errors
@@ -63,6 +143,7 @@ pub fn planned(
     case: &Case,
     aim: &Aim,
     configuration: Option<&str>,
+    refusal: Option<&str>,
     path: &Path,
 ) -> Result<Planned, Refusal> {
     let needle = needle(case, aim)?;
@@ -77,7 +158,7 @@ pub fn planned(
         ),
     })?;
     let mut edit = ScenarioEdit::new(&file, &text)?;
-    edit_goal(&mut edit, case, &needle.section, configuration)?;
+    edit_goal(&mut edit, case, &needle.section, configuration, refusal)?;
     let is_open = |goal: &GoalSection| {
         goal.name != needle.section.name
             && goal.entry_mm.is_none()
@@ -135,6 +216,7 @@ fn edit_goal(
     case: &Case,
     section: &GoalSection,
     configuration: Option<&str>,
+    refusal: Option<&str>,
 ) -> Result<(), Finding> {
     let own = case
         .goals()
@@ -171,11 +253,12 @@ fn edit_goal(
         edit.remove(&at, key)?;
     }
     let chosen = configuration.map_or(String::new(), |label| format!(", for {label}"));
+    let refused = refusal.map_or(String::new(), |why| format!("; REFUSED: {why}"));
     let entry = in_mm(section.entry_mm.unwrap_or_default());
     edit.set(
         &at,
         "entry_mm",
-        &format!("{entry} # chosen on the planning page{chosen}"),
+        &format!("{entry} # chosen on the planning page{chosen}{refused}"),
     )?;
     if former.is_none() {
         edit.set(&at, "standoff_mm", &format!("{:?}", section.standoff_mm))?;

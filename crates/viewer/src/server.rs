@@ -29,11 +29,12 @@ use crate::answer::{Problem, json_response};
 use crate::case::Case;
 use crate::entries;
 use crate::guard::{COOKIE, Hosts, Token, check_cookie, check_token};
+use crate::listen::serve;
 use crate::live::{self, Aim, GoalAim, Refusal};
 use crate::motion;
 use crate::page;
 use crate::people;
-use crate::plan_file::{PLAN_FILE, write_plan};
+use crate::plan_file::{Consent, NotWritten, PLAN_FILE, Written, write_plan};
 use crate::session::{NotKept, SessionFile, State as SessionState};
 use crate::simulation::{Engine, Simulation};
 use crate::turns::Turns;
@@ -55,6 +56,9 @@ pub enum ServerError {
     /// Somebody else writes the session.
     #[error("another `needlebench view` shows this folder")]
     Shown,
+    /// Something else has the name of the lock.
+    #[error("session.lock in this folder is no file of its own")]
+    LockIsNoFile,
     /// No random numbers for a token.
     #[error("this machine gives no random numbers: {0}")]
     Random(#[from] getrandom::Error),
@@ -69,6 +73,7 @@ impl ServerError {
         match self {
             Self::Port { .. } => Some("without --port any free one is taken"),
             Self::Shown => Some("open the address that it printed, or end it first"),
+            Self::LockIsNoFile => Some("remove the link or folder session.lock: it is made anew"),
             Self::Random(_) | Self::Runtime(_) => None,
         }
     }
@@ -79,7 +84,18 @@ const LOCK_FILE: &str = "session.lock";
 
 /// Nothing where locks or files cannot be had: the session says so when it cannot be kept.
 fn locked(folder: &Path) -> Result<Option<File>, ServerError> {
-    let Ok(file) = File::create(folder.join(LOCK_FILE)) else {
+    let path = folder.join(LOCK_FILE);
+    // A link would be followed, and what it leads to is nobody's to open here.
+    if path.symlink_metadata().is_ok_and(|about| !about.is_file()) {
+        return Err(ServerError::LockIsNoFile);
+    }
+    let opened = File::options()
+        .read(true)
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(path);
+    let Ok(file) = opened else {
         return Ok(None);
     };
     match file.try_lock() {
@@ -137,7 +153,7 @@ impl Server {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
-            .enable_io()
+            .enable_all()
             .build()
             .map_err(ServerError::Runtime)?;
         let taken = |error| ServerError::Port { port, error };
@@ -184,21 +200,17 @@ impl Server {
     }
 
     /// Answers until somebody stops it.
-    ///
-    /// # Errors
-    /// A listener that breaks.
-    pub fn run(self) -> Result<(), ServerError> {
+    pub fn run(self) {
         let router = router(Arc::clone(&self.app));
-        let served = self.runtime.block_on(async {
+        self.runtime.block_on(async {
             // Pages hold connections open that would be waited for otherwise.
             tokio::select! {
-                served = axum::serve(self.listener, router) => served,
-                () = self.stopped.notified() => Ok(()),
+                () = serve(self.listener, router) => {}
+                () = self.stopped.notified() => {}
             }
         });
         self.app.simulation.cancel();
         self.runtime.shutdown_background();
-        served.map_err(ServerError::Runtime)
     }
 }
 
@@ -636,27 +648,55 @@ struct PlanQuestion {
     configuration: Option<String>,
     #[serde(default)]
     name: Option<String>,
+    #[serde(default)]
+    consent: Consent,
     /// Of a simulation.
     #[serde(default)]
     engine: Option<Engine>,
 }
 
-async fn written(
-    app: &Arc<App>,
-    question: PlanQuestion,
-) -> Result<(PathBuf, Vec<String>), Problem> {
+impl From<NotWritten> for Problem {
+    fn from(why: NotWritten) -> Self {
+        match why {
+            NotWritten::Refused(refusal) => refusal.into(),
+            NotWritten::Exists { file, free } => {
+                Self::new(StatusCode::CONFLICT, format!("there is a {file} already"))
+                    .hint("overwrite it, or choose another name")
+                    .with("ask", &"overwrite")
+                    .with("file", &file)
+                    .with("free", &free)
+            }
+            NotWritten::NotAllowed(why) => Self::new(
+                StatusCode::CONFLICT,
+                format!("this needle is not allowed: {why}"),
+            )
+            .hint("the file will say that it is refused")
+            .with("ask", &"refused"),
+        }
+    }
+}
+
+async fn written(app: &Arc<App>, question: PlanQuestion) -> Result<Written, Problem> {
     let case = Arc::clone(&app.case);
     let _one = app.writing.lock().await;
-    let work = move || {
+    let threads = app.threads;
+    let work = move |cancel: &AtomicBool| {
+        let control = Control {
+            threads,
+            cancel,
+            progress: &Silent,
+        };
         let name = question.name.as_deref().unwrap_or(PLAN_FILE);
         write_plan(
             &case,
             &question.aim,
             question.configuration.as_deref(),
             name,
+            question.consent,
+            &control,
         )
     };
-    Ok(app.exact.run(None, work).await??)
+    Ok(app.exact.run_until(None, work).await??)
 }
 
 fn file_name(path: &std::path::Path) -> String {
@@ -667,19 +707,20 @@ fn file_name(path: &std::path::Path) -> String {
 }
 
 async fn plan(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
-    let (path, left_out) = written(&app, read(body)?).await?;
+    let plan = written(&app, read(body)?).await?;
     Ok(json_response(&json!({
-        "file": file_name(&path),
-        "path": path.display().to_string(),
-        "left_out": left_out,
+        "file": file_name(&plan.path),
+        "path": plan.path.display().to_string(),
+        "left_out": plan.left_out,
+        "refusal": plan.refusal,
     })))
 }
 
 async fn simulate(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
     let question: PlanQuestion = read(body)?;
     let engine = question.engine.unwrap_or(Engine::Rapier);
-    let (path, left_out) = written(&app, question).await?;
-    let progress = app.simulation.start(&path, left_out, engine)?;
+    let plan = written(&app, question).await?;
+    let progress = app.simulation.start(&plan.path, plan.left_out, engine)?;
     let cookie = format!(
         "{COOKIE}={}; HttpOnly; SameSite=Strict; Path=/results",
         app.results.text()

@@ -2,6 +2,10 @@
 
 mod support;
 
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::time::Duration;
+
 use serde_json::{Value, json};
 
 use support::Running;
@@ -354,6 +358,86 @@ fn a_plan_is_the_scenario_with_another_goal_and_stays_in_its_folder() {
 }
 
 #[test]
+fn a_needle_that_is_refused_and_a_file_that_is_there_are_asked_about() {
+    let server = Running::start();
+    // Of another page: on this one nobody asks for entries before a needle is saved.
+    let asked = Running::start();
+    asked.post(
+        "/api/entries",
+        &json!({"aim": {"goal": "nodule", "target": {"lesion": "nodule"}}, "robot": false}),
+    );
+    let [x, y, z] = support::NODULE_M;
+    let refusal = |entry: [f64; 3]| {
+        let aim =
+            json!({"goal": "nodule", "target": {"lesion": "nodule"}, "entry": {"place_m": entry}});
+        let route = asked.post("/api/route", &json!({"aim": aim})).json();
+        (aim, route["refusal"].as_str().map(str::to_owned))
+    };
+    // From above the table: some needles cross what the rules of routes forbid.
+    let around = (0..36).map(|step| {
+        let angle = -std::f64::consts::PI * f64::from(step) / 36.0;
+        refusal([x + 0.2 * libm::cos(angle), y + 0.2 * libm::sin(angle), z])
+    });
+    let all: Vec<_> = around.collect();
+    let (refused, why) = all
+        .iter()
+        .find(|(_, why)| why.is_some())
+        .expect("a needle is refused");
+    let (allowed, _) = all
+        .iter()
+        .find(|(_, why)| why.is_none())
+        .expect("a way is free");
+    let save = |aim: &Value, name: &str, consent: Value| {
+        server.post(
+            "/api/plan",
+            &json!({"aim": aim, "name": name, "consent": consent}),
+        )
+    };
+    let asked = save(refused, "mine", json!({}));
+    assert_eq!(
+        (asked.status, &asked.json()["ask"]),
+        (409, &json!("refused")),
+        "{}",
+        asked.text()
+    );
+    assert!(!server.folder().join("mine.toml").exists());
+    let agreed = save(refused, "mine", json!({"refused": true}));
+    assert_eq!(
+        agreed.json()["refusal"].as_str(),
+        why.as_deref(),
+        "{}",
+        agreed.text()
+    );
+    let text = std::fs::read_to_string(server.folder().join("mine.toml")).unwrap();
+    assert!(
+        text.contains(&format!("REFUSED: {}", why.as_ref().unwrap())),
+        "{text}"
+    );
+    // The same again changes nothing; another text is asked about, and has a name of its own to go to.
+    assert_eq!(save(refused, "mine", json!({"refused": true})).status, 200);
+    let asked = save(allowed, "mine", json!({}));
+    assert_eq!(asked.status, 409);
+    assert_eq!(
+        [&asked.json()["ask"], &asked.json()["free"]],
+        [&json!("overwrite"), &json!("mine-2")]
+    );
+    assert_eq!(
+        text,
+        std::fs::read_to_string(server.folder().join("mine.toml")).unwrap()
+    );
+    assert_eq!(
+        save(allowed, "mine", json!({"overwrite": true})).status,
+        200
+    );
+    assert_ne!(
+        text,
+        std::fs::read_to_string(server.folder().join("mine.toml")).unwrap()
+    );
+    let simulated = server.post("/api/simulation", &json!({"aim": refused, "name": "third"}));
+    assert_eq!(simulated.status, 409, "{}", simulated.text());
+}
+
+#[test]
 fn a_folder_that_disappears_is_said_and_what_is_shown_stays() {
     let server = Running::start();
     std::fs::remove_dir_all(server.folder()).unwrap();
@@ -364,6 +448,52 @@ fn a_folder_that_disappears_is_said_and_what_is_shown_stays() {
     assert_eq!(server.get("/api/session").status, 410);
     assert!(!server.folder().exists(), "nothing makes it anew");
     assert_eq!(server.get("/api/volume").status, 200);
+}
+
+#[test]
+fn connections_that_say_nothing_are_let_go_and_keep_nobody_out() {
+    let server = Running::start();
+    // More than there is room for at once.
+    let mut idle: Vec<TcpStream> = (0..80)
+        .map(|_| {
+            let mut stream = TcpStream::connect(("127.0.0.1", server.port)).unwrap();
+            stream.write_all(b"GET").unwrap();
+            stream
+        })
+        .collect();
+    assert_eq!(server.get("/api/case").status, 200);
+    let first = &mut idle[0];
+    first
+        .set_read_timeout(Some(Duration::from_secs(20)))
+        .unwrap();
+    let mut said = Vec::new();
+    // Let go, with a word or without.
+    assert!(first.read_to_end(&mut said).is_ok(), "it is still held");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_lock_that_is_a_link_is_not_followed() {
+    let made = support::patient();
+    let folder = support::copy_of(&made);
+    let outside = folder.path().with_extension("outside");
+    std::fs::write(&outside, "somebody else's").unwrap();
+    std::os::unix::fs::symlink(&outside, folder.path().join("session.lock")).unwrap();
+    let case = needlebench_viewer::Case::open(
+        folder.path(),
+        &needlebench_cell::Overrides::default(),
+        &std::sync::atomic::AtomicBool::new(false),
+    );
+    let refused = needlebench_viewer::Server::new(case.unwrap(), 0, "needlebench".into());
+    assert!(matches!(
+        refused,
+        Err(needlebench_viewer::ServerError::LockIsNoFile)
+    ));
+    assert_eq!(
+        std::fs::read_to_string(&outside).unwrap(),
+        "somebody else's"
+    );
+    std::fs::remove_file(&outside).unwrap();
 }
 
 #[test]

@@ -50,6 +50,42 @@ PLAN.fetch = async (path, options = {}) => {
 
 PLAN.ask = async (path, options) => (await PLAN.fetch(path, options)).json();
 
+/** Asks a question at a place of the page; which of the answers was chosen. */
+PLAN.question = (at, text, answers) =>
+  new Promise((resolve) => {
+    at.className = 'bad';
+    const buttons = answers.map((answer, index) =>
+      NB.el('button', { type: 'button', onclick: () => resolve(index), text: answer }),
+    );
+    NB.clear(at, `${text} `, ...buttons.flatMap((button) => [button, ' ']));
+    buttons.at(-1)?.focus();
+  });
+
+/** Has a plan written; where that would overwrite something, or keep a needle that is refused, it asks before. */
+PLAN.write = async (path, plan, at) => {
+  // Who has agreed to a needle is not asked again.
+  const needle = JSON.stringify(plan.aim);
+  /** @type {{ name?: string, consent: { overwrite: boolean, refused: boolean } }} */
+  const body = { ...plan, consent: { overwrite: false, refused: PLAN.agreed === needle } };
+  for (;;) {
+    try {
+      return await PLAN.ask(path, { body });
+    } catch (error) {
+      const { ask, file, free } = error.body || {};
+      if (!ask) throw error;
+      const answers =
+        ask === 'refused' ? ['Save it as refused', 'Cancel'] : [`Overwrite ${file}`, `Save as ${free}.toml`, 'Cancel'];
+      const answer = await PLAN.question(at, `${error.message}: ${error.hint}.`, answers);
+      if (answer === answers.length - 1) throw new Problem(0, { error: 'nothing was written' });
+      if (ask === 'refused') {
+        body.consent.refused = true;
+        PLAN.agreed = needle;
+      } else if (answer === 0) body.consent.overwrite = true;
+      else body.name = free;
+    }
+  }
+};
+
 /**
  * Asks for the latest question alone: while one is answered, only the newest that came since waits.
  * @template {keyof Questions} Kind

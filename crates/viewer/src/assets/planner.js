@@ -650,6 +650,9 @@ class Planner {
     const { not_placed: unplaced } = this.route;
     NB.clear(
       this.numbers,
+      this.route.refusal
+        ? NB.el('p', { class: 'error', text: `This needle is refused: ${this.route.refusal}.` })
+        : null,
       unplaced
         ? [
             NB.el('p', { class: 'error', text: `${unplaced.message}.` }),
@@ -688,16 +691,17 @@ class Planner {
     const counted = quick
       ? `At least ${preview.working} of 8 can reach it: 12 directions about the needle each; all of them follow`
       : `${preview.working} of 8 can reach it, by their postures`;
+    const { refusal } = this.route || {};
     const list = NB.table(
       counted,
       [
         { title: 'Configuration', cell: ({ each }) => each.label },
         {
-          title: 'Works',
+          title: refusal ? 'Reaches' : 'Works',
           cell: ({ each }) =>
             NB.el('span', {
-              class: each.works ? 'good' : 'bad',
-              text: each.works ? 'yes' : quick ? 'not yet' : 'no',
+              class: each.works && !refusal ? 'good' : 'bad',
+              text: each.works ? (refusal ? 'reaches, not allowed' : 'yes') : quick ? 'not yet' : 'no',
             }),
         },
         { title: 'Nearest', unit: 'mm', numeric: true, cell: ({ each }) => NB.mm(each.nearest?.distance_m) },
@@ -719,7 +723,12 @@ class Planner {
     const rows = NB.tableRows(list);
     NB.rows(rows, (index) => this.choose(preview.configurations[index].label));
     const focused = NB.tableRows(this.configurations).findIndex((row) => row.matches(':focus'));
-    NB.clear(this.configurations, list, this.chosenText());
+    NB.clear(
+      this.configurations,
+      refusal ? NB.el('p', { class: 'error', text: `None may be used: the needle is refused, ${refusal}.` }) : null,
+      list,
+      this.chosenText(),
+    );
     if (focused >= 0) rows[focused].focus();
   }
 
@@ -735,8 +744,10 @@ class Planner {
     const how = first
       ? NB.el('p', { class: 'bad', text: `${chosen}: ${first.words}. ${first.detail}.` })
       : NB.el('p', {
-          class: 'good',
-          text: `${chosen}: a motion of ${NB.fixed(motion.time_s.at(-1), 1)} s is planned and keeps all clearances.`,
+          class: this.route?.refusal ? 'bad' : 'good',
+          text: `${chosen}: a motion of ${NB.fixed(motion.time_s.at(-1), 1)} s is planned and keeps all clearances${
+            this.route?.refusal ? '; the needle itself is refused' : ''
+          }.`,
         });
     const tip = motion.tip
       ? NB.el('p', {
@@ -1136,9 +1147,11 @@ class Planner {
 
   async savePlan() {
     try {
-      const { file, left_out: leftOut } = await PLAN.ask('plan', { body: this.plan() });
-      this.saved.textContent = `Saved as ${file}; needlebench run takes it as it is.${PLAN.withoutGoals(leftOut)}`;
-      this.saved.className = 'good';
+      const { file, left_out: leftOut, refusal } = await PLAN.write('plan', this.plan(), this.saved);
+      this.saved.textContent = refusal
+        ? `Saved as ${file}, where it says that the needle is refused: ${refusal}.`
+        : `Saved as ${file}; needlebench run takes it as it is.${PLAN.withoutGoals(leftOut)}`;
+      this.saved.className = refusal ? 'bad' : 'good';
     } catch (error) {
       this.saved.textContent = `Not saved: ${error.message}${error.hint ? ` (${error.hint})` : ''}`;
       this.saved.className = 'bad';

@@ -57,7 +57,7 @@ PLAN.routeRows = (columns, caption) => {
         class: known.kept ? 'good' : 'bad',
         text:
           `${NB.mm(known.distance_m)}${off} to ${known.words}, ` +
-          `${known.kept ? '' : 'too near: '}${NB.mm(known.margin_m)} wanted`,
+          `${known.kept ? '' : 'refused: '}${NB.mm(known.margin_m)} wanted`,
       });
     });
   }
@@ -72,7 +72,13 @@ PLAN.routeRows = (columns, caption) => {
     rows.push({
       title: 'Configurations',
       unit: 'of 8',
-      cells: columns.map(({ reach }) => (reach?.preview ? String(reach.preview.working) : '\u2013')),
+      cells: columns.map(({ route, reach }) => {
+        if (!reach?.preview) return '\u2013';
+        const { working } = reach.preview;
+        return route?.refusal
+          ? NB.el('span', { class: 'bad', text: `none: ${working} reach it, not allowed` })
+          : String(working);
+      }),
     });
   /** @type {Column<(typeof rows)[number]>[]} */
   const heads = [

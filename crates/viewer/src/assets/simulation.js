@@ -80,7 +80,7 @@ class Simulation {
   async start() {
     this.startButton.disabled = true;
     try {
-      this.told(await PLAN.ask('simulation', { body: { ...this.planner.plan(), engine: this.engine } }));
+      this.told(await PLAN.write('simulation', { ...this.planner.plan(), engine: this.engine }, this.said));
     } catch (error) {
       this.said.textContent = `${error.message}${error.hint ? ` (${error.hint})` : ''}`;
       this.said.className = 'bad break';

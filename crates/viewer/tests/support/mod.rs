@@ -159,7 +159,7 @@ fn copy_into(from: &Path, to: &Path) {
 /// A server in a thread of its own.
 pub struct Running {
     pub token: String,
-    port: u16,
+    pub port: u16,
     stopper: Stopper,
     thread: Option<JoinHandle<()>>,
     folder: Option<TempDir>,
@@ -191,7 +191,7 @@ impl Running {
             token,
             port,
             stopper,
-            thread: Some(std::thread::spawn(move || server.run().unwrap())),
+            thread: Some(std::thread::spawn(move || server.run())),
             folder: Some(folder),
         }
     }

@@ -136,6 +136,8 @@ interface RouteAnswer {
   }[];
   fissures: string[];
   judged: Judged | null;
+  /** Why no run allows it. */
+  refusal: string | null;
 }
 
 /** A needle by the rules of routes. */
@@ -250,6 +252,10 @@ interface ProblemBody {
   hint?: string;
   /** What another tab has kept. */
   session?: Session;
+  /** What has to be agreed to before a plan is written. */
+  ask?: 'refused' | 'overwrite';
+  file?: string;
+  free?: string;
 }
 
 /** An answer that may be that there is none: refused, or not to be had at all. */
@@ -304,6 +310,10 @@ interface Planning {
   // The caller knows what it has asked for.
   // biome-ignore lint/suspicious/noExplicitAny: read from outside
   ask(path: string, options?: AskOptions): Promise<any>;
+  question(at: HTMLElement, text: string, answers: string[]): Promise<number>;
+  // biome-ignore lint/suspicious/noExplicitAny: read from outside
+  write(path: string, plan: { aim: NeedleAim | null; engine?: string }, at: HTMLElement): Promise<any>;
+  agreed?: string;
   rgb(channels: Bytes): string;
   swatch(color: string, words: string): HTMLElement;
 
