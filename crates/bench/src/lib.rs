@@ -55,7 +55,7 @@ pub use needlebench_geometry::mesh::{forget_kept_meshes, kept_meshes};
 pub use preview::Preview;
 pub use real_cell::servo_of;
 pub use rtde::{RtdeLog, RtdeRow, RtdeSource};
-pub use run::{run, run_scenario};
+pub use run::{LEFT_OUT, run, run_scenario};
 pub use runnable::Runnable;
 pub use scenario_run::{
     ExcitationRun, ProtocolRun, RealArm, RunError, RunOptions, ScenarioRun, StoppedRun,

@@ -52,6 +52,7 @@ pub(crate) fn jobs(setup: &Setup<'_>, plans: &[GoalPlan]) -> Vec<Job> {
                             rejection.rule,
                             Rule::NeedleRoute
                                 | Rule::Collision
+                                | Rule::TooClose
                                 | Rule::NeedleCorridor
                                 | Rule::NoMotion
                         )

@@ -146,6 +146,8 @@ impl<'a> RealCell<'a> {
             );
             if touches_skin && let Some(bound_m) = &mut found.certified_lower_bound_m {
                 *bound_m -= truth.breath_allowance_m;
+                let breathes = truth.breath_allowance_m > 0.0;
+                found.breath_allowance_m = breathes.then_some(truth.breath_allowance_m);
             }
         }
     }

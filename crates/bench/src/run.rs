@@ -6,11 +6,17 @@ use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use needlebench_cell::ResolvedScenario;
+use needlebench_cell::study::StudyMode;
+use needlebench_cell::{ClearanceClass, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
-use needlebench_evaluation::report::EngineFailure;
+use needlebench_evaluation::report::{
+    EngineFailure, GoalReport, NotJudged, Report, Status, Verdict,
+};
 use needlebench_evaluation::trace::trace;
+use needlebench_evaluation::{
+    comparing_engines, criteria_with_limits, excitation as excited, iso9283 as protocol,
+};
 use needlebench_parallel::in_parallel;
 use needlebench_planning::GoalPlan;
 
@@ -55,9 +61,124 @@ pub fn run(
     } else {
         run_goals(runnable.scenario(), options, &engines, &control)?
     };
+    judge_alone(&mut finished.report, runnable.scenario(), options, &engines);
+    judge_unseen(&mut finished.report, runnable.scenario());
+    judge_absent(&mut finished.report, runnable.scenario(), &engines);
     let requirements = &runnable.scenario().scenario.requirements;
     trace(&mut finished.report, requirements);
     Ok(finished)
+}
+
+/// Beginning of the note on criteria that the choice of engines leaves out.
+pub const LEFT_OUT: &str = "not judged, since the command chose";
+
+/// What engines differ by takes two of them. Where one ran alone, the criteria on it are not judged; where it was
+/// the command that left the other one out, a note says which those are.
+fn judge_alone(
+    report: &mut Report,
+    resolved: &ResolvedScenario,
+    options: &RunOptions,
+    engines: &[&'static dyn Engine],
+) {
+    let keys = comparing_engines(&resolved.scenario.criteria);
+    let [only] = engines else { return };
+    if keys.is_empty() {
+        return;
+    }
+    let of_scenario = RunOptions {
+        engines: None,
+        ..options.clone()
+    };
+    let own = of_scenario.chosen_engines(resolved);
+    if own.is_ok_and(|own| own.len() > 1) {
+        let note = format!("{LEFT_OUT} {} alone: {}", only.name(), keys.join(", "));
+        report.notes.push(note);
+        return;
+    }
+    let reason = format!(
+        "it takes two engines, and the scenario runs {} alone",
+        only.name()
+    );
+    leave_open(report, &keys, &reason);
+}
+
+/// Nothing is known of the clearance of a part that has no shape: no class that it belongs to is judged.
+fn judge_unseen(report: &mut Report, resolved: &ResolvedScenario) {
+    for (class, parts) in &resolved.cell.unseen {
+        let key = format!("min_clearance_mm.{}", class.name());
+        let reason = format!("no collision shape is known of {}", parts.join(", "));
+        // What the other parts miss is missed.
+        report
+            .criteria
+            .retain(|result| result.criterion != key || !result.pass);
+        leave_open(report, &[&key], &reason);
+    }
+}
+
+/// A criterion that is asked for and that nothing in the scenario can be judged by, as the clearance of a gantry that is
+/// not in the room, is not judged.
+fn judge_absent(report: &mut Report, resolved: &ResolvedScenario, engines: &[&'static dyn Engine]) {
+    let moved = |goal: &GoalReport| {
+        let mut all = goal.configurations.iter();
+        all.any(|each| each.status != Status::Rejected)
+    };
+    if !report.goals.iter().any(moved) {
+        return;
+    }
+    let criteria = &resolved.scenario.criteria;
+    let compared = comparing_engines(criteria);
+    for key in criteria_with_limits(criteria, StudyMode::Dynamic) {
+        let is_known = report.criteria.iter().any(|each| each.criterion == key)
+            || report.not_judged.iter().any(|each| each.criterion == key);
+        let said = engines.len() == 1 && compared.contains(&key);
+        if !is_known && !said {
+            let class = key
+                .strip_prefix("min_clearance_mm.")
+                .and_then(ClearanceClass::named);
+            let pairs = &resolved.cell.pairs;
+            let absent = class.filter(|class| {
+                *class != ClearanceClass::NeedleRoute
+                    && pairs.iter().all(|pair| pair.class != *class)
+            });
+            let reason = match absent.and_then(|class| class.name().strip_prefix("robot_")) {
+                Some(body) => format!("there is no {body} in the room"),
+                None => "nothing has a value for it".to_owned(),
+            };
+            leave_open(report, &[key], &reason);
+        }
+    }
+}
+
+/// Criteria of all that moved are not judged.
+fn leave_open(report: &mut Report, keys: &[&str], reason: &str) {
+    let mut subjects: Vec<(String, Option<String>)> = Vec::new();
+    if report.iso9283.is_some() {
+        subjects.push((protocol::SUBJECT.to_owned(), None));
+    } else if report.excitation.is_some() {
+        subjects.push((excited::SUBJECT.to_owned(), None));
+    }
+    for goal in &mut report.goals {
+        for configuration in &mut goal.configurations {
+            if configuration.status != Status::Rejected {
+                configuration.not_judged += keys.len();
+                subjects.push((goal.name.clone(), Some(configuration.label.to_owned())));
+            }
+        }
+    }
+    for (goal, label) in subjects {
+        report.not_judged.extend(keys.iter().map(|key| NotJudged {
+            goal: goal.clone(),
+            label: label.clone(),
+            engine: None,
+            criterion: (*key).to_owned(),
+            reason: reason.to_owned(),
+            requirement: None,
+        }));
+    }
+    report.verdict = Verdict::of(
+        report.verdict == Verdict::Fail,
+        !report.not_judged.is_empty(),
+    );
 }
 
 /// Runs a scenario without progress and without a way to interrupt it.

@@ -10,8 +10,13 @@ use serde::Serialize;
 pub struct ClassClearance {
     /// Signed distance: positive apart, negative the penetration depth.
     pub minimum_m: f64,
-    /// Proven lower bound over the whole motion; none where there is no motion.
+    /// Proven lower bound over the whole motion; none where there is no motion. With a breath that is held at another
+    /// phase than was planned for, it holds in every phase.
     pub certified_lower_bound_m: Option<f64>,
+    /// What is taken off the bound of the motion as it was, since the skin may come nearer in another phase of the breath;
+    /// none without breath. Only the rest of the distance between bound and minimum is what the proof could not close.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub breath_allowance_m: Option<f64>,
     /// The two solids.
     pub pair: [String; 2],
     /// Nearest (or deepest) points of the two, in the world.

@@ -274,6 +274,7 @@ pub fn route_clearance(part: &str, separation: &Separation) -> ClassClearance {
     ClassClearance {
         // One exact distance that is never optimistic, but for rounding.
         certified_lower_bound_m: Some(separation.distance_m - ROUNDING_M),
+        breath_allowance_m: None,
         ..class_clearance(("needle", part), separation, "insertion", None, None)
     }
 }
@@ -288,6 +289,7 @@ pub(crate) fn class_clearance(
     ClassClearance {
         minimum_m: separation.distance_m,
         certified_lower_bound_m: None,
+        breath_allowance_m: None,
         pair: [solid_a.to_owned(), solid_b.to_owned()],
         witness_points_m: [
             separation.point_on_a.coords.into(),

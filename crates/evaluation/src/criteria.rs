@@ -42,6 +42,24 @@ fn limits(
     })
 }
 
+/// Keys of the criteria that have a limit and that cases of a mode are judged by.
+pub fn criteria_with_limits(criteria: &CriteriaSection, mode: StudyMode) -> Vec<&'static str> {
+    let mut keys: Vec<&'static str> = limits(criteria, mode)
+        .map(|(_, criterion, _)| criterion.key)
+        .collect();
+    keys.sort_unstable();
+    keys.dedup();
+    keys
+}
+
+/// Keys of the criteria on what engines differ by that have a limit: they take two engines.
+pub fn comparing_engines(criteria: &CriteriaSection) -> Vec<&'static str> {
+    limits(criteria, StudyMode::Dynamic)
+        .filter(|(_, criterion, _)| criterion.missing == Missing::UnjudgedIfCompared)
+        .map(|(_, criterion, _)| criterion.key)
+        .collect()
+}
+
 /// The criteria on what each engine measured, engine by engine.
 fn of_engines<'a>(
     configuration: &'a ConfigurationReport,

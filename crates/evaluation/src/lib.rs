@@ -38,7 +38,10 @@ pub use clearance::{
     planned_clearance, posture_clearance, recorded_clearance, route_clearance, sample_indices,
 };
 pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds};
-pub use criteria::{check_configuration, first_missed_by_posture, worst_miss_by_posture_m};
+pub use criteria::{
+    check_configuration, comparing_engines, criteria_with_limits, first_missed_by_posture,
+    worst_miss_by_posture_m,
+};
 pub use engine_pairs::{largest_over_pairs, pairs};
 pub use judge::{EXPECTED, judge, route_is_expected};
 pub use motion::{

@@ -91,6 +91,13 @@ pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
             .map(|at| label(at).to_owned())
             .collect(),
         metrics,
+        not_told_apart: match &scored {
+            Some(scored) => not_told_apart(&columns, scored, &order)
+                .into_iter()
+                .map(|at| label(at).to_owned())
+                .collect(),
+            None => Vec::new(),
+        },
         runner_up: order.get(1).map(|&at| label(at).to_owned()),
         smallest_weight_change: change,
     };
@@ -250,6 +257,28 @@ fn scores(columns: &[Column], count: usize) -> Option<Vec<RankingReport>> {
         }
     };
     Some((0..count).map(report).collect())
+}
+
+/// Those after the first of the order whose score the resolutions of the first's metrics reach.
+///
+/// A value that differs by its resolution is the same value, so a score is known to
+/// `sum_k w_k max(|u_k(v_k - r_k) - u_k|, |u_k(v_k + r_k) - u_k|) / sum_k w_k` and no better.
+fn not_told_apart(columns: &[Column], scored: &[RankingReport], order: &[usize]) -> Vec<usize> {
+    let Some((&first, others)) = order.split_first() else {
+        return Vec::new();
+    };
+    let total: f64 = columns.iter().map(|column| column.aim.weight).sum();
+    let reach: f64 = columns
+        .iter()
+        .map(|column| {
+            let value = column.values[first];
+            let step = column.scale.resolution;
+            let moved = |value: f64| (column.aim.utility(value) - column.utility(first)).abs();
+            column.aim.weight / total * moved(value - step).max(moved(value + step))
+        })
+        .sum();
+    let is_reached = |at: &usize| scored[first].score - scored[*at].score <= reach;
+    others.iter().copied().filter(is_reached).collect()
 }
 
 /// Weights this much smaller than they were are 0.

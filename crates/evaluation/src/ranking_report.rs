@@ -55,6 +55,9 @@ pub struct GoalRanking {
     pub pareto_set: Vec<String>,
     /// The metrics and how each counts.
     pub metrics: Vec<RankedMetric>,
+    /// Configurations whose scores are below the first's by no more than the resolutions of its metrics add up to: what
+    /// they lack decides nothing.
+    pub not_told_apart: Vec<String>,
     /// Second choice.
     pub runner_up: Option<String>,
     /// Smallest change of one weight that makes another configuration the first choice; none if no

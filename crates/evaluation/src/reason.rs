@@ -64,13 +64,32 @@ fn beside(
     let (Some(mine), Some(theirs)) = (&first.ranking, &second.ranking) else {
         return format!("first in the table of {count} that work");
     };
+    let (ahead, behind) = differences(mine, theirs);
+    let score = mine.score * 100.0;
+    if !ranking.not_told_apart.is_empty() {
+        let mut apart: Vec<&Difference<'_>> = ahead.iter().chain(&behind).collect();
+        apart.sort_by(|a, b| b.lead.abs().total_cmp(&a.lead.abs()));
+        let apart: Vec<&str> = apart
+            .iter()
+            .take(2)
+            .map(|each| words(each.mine.metric))
+            .collect();
+        let decide = if apart.is_empty() {
+            String::new()
+        } else {
+            format!("; what would decide is {}", apart.join(" or "))
+        };
+        return format!(
+            "score {score:.1} of 100, first of {count} that work, but not told apart from {} (within what the metrics \
+             resolve){decide}",
+            and(&ranking.not_told_apart)
+        );
+    }
     let scores = format!(
-        "score {:.1} of 100, best of {count} that work; next is {} with {:.1}",
-        mine.score * 100.0,
+        "score {score:.1} of 100, best of {count} that work; next is {} with {:.1}",
         second.label,
         theirs.score * 100.0
     );
-    let (ahead, _) = differences(mine, theirs);
     let leads: Vec<&str> = ahead
         .iter()
         .take(2)
@@ -103,6 +122,12 @@ fn against(
         format!("{} has {:.1}", second.label, 100.0 * theirs.score),
     ];
     let (ahead, behind) = differences(mine, theirs);
+    if !ranking.not_told_apart.is_empty() {
+        clauses.push(format!(
+            "not told apart from {}: their scores are nearer than the resolutions of the metrics add up to",
+            and(&ranking.not_told_apart)
+        ));
+    }
     if (mine.score - theirs.score).abs() <= SAME_SCORE {
         clauses.push("the two are even and it comes first in the table".to_owned());
     }
@@ -126,6 +151,15 @@ fn against(
         ));
     }
     clauses
+}
+
+/// `A`, `A and B`, `A, B and C`.
+fn and(labels: &[String]) -> String {
+    match labels.split_last() {
+        Some((last, [])) => last.clone(),
+        Some((last, others)) => format!("{} and {last}", others.join(", ")),
+        None => String::new(),
+    }
 }
 
 fn words(key: &'static str) -> &'static str {

@@ -48,7 +48,7 @@ const MOST_ASKED: usize = 200;
 /// Smallest step of a direction that is moved to the best place near by, rad.
 const REFINED_RAD: f64 = 0.002;
 /// Logarithms of odds that differ by less are equal: a tenth, since no ratio is known better.
-const SAME_ODDS: f64 = 0.1;
+pub const SAME_ODDS: f64 = 0.1;
 /// Steps that directions are rounded to, deg: what is written is what was judged.
 const ROUNDED: f64 = 100.0;
 

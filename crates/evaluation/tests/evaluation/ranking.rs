@@ -24,6 +24,7 @@ fn clearance(minimum_m: f64, certified_lower_bound_m: Option<f64>) -> ClassClear
     ClassClearance {
         minimum_m,
         certified_lower_bound_m,
+        breath_allowance_m: None,
         pair: ["forearm.2".into(), "skin".into()],
         witness_points_m: [[0.0; 3], [minimum_m, 0.0, 0.0]],
         phase: "transfer",
@@ -60,8 +61,8 @@ fn budget(rms_m: f64) -> ErrorBudget {
         analytic: moments,
         monte_carlo: None,
         radius_95_m: Some(2.0 * rms_m),
-        covariance_difference: None,
         drawn_radius_95_m: None,
+        covariance_difference: None,
         bias_difference_m: None,
     };
     ErrorBudget {
@@ -112,6 +113,7 @@ fn configuration(index: usize) -> ConfigurationReport {
         "robot_gantry",
         "robot_mount",
         "robot_obstacle",
+        "robot_person",
         "self",
         "tool_phantom",
         "guide_standoff",
@@ -426,6 +428,34 @@ fn more_clearance_is_chosen_and_dominates() {
 }
 
 #[test]
+fn what_the_metrics_do_not_resolve_is_not_told_apart() {
+    let goal = ranked(vec![
+        with_clearance(configuration(0), 0.0300),
+        with_clearance(configuration(1), 0.0304),
+        with_clearance(configuration(2), 0.0250),
+    ]);
+    assert_eq!(chosen(&goal), "Right-Up-Fold");
+    assert_eq!(
+        goal.ranking.as_ref().unwrap().not_told_apart,
+        ["Right-Down-Fold"]
+    );
+    let recommended = goal.recommended.as_ref().unwrap();
+    assert!(
+        recommended
+            .summary
+            .contains("not told apart from Right-Down-Fold (within what the metrics resolve)"),
+        "{}",
+        recommended.summary
+    );
+    let far = ranked(vec![
+        with_clearance(configuration(0), 0.02),
+        with_clearance(configuration(1), 0.04),
+    ]);
+    assert!(far.ranking.unwrap().not_told_apart.is_empty());
+    assert!(far.recommended.unwrap().summary.contains("best of 2"));
+}
+
+#[test]
 fn noise_decides_nothing() {
     let goal = ranked(vec![
         with_clearance(with_margin(0, 0.4), 0.02),
@@ -453,6 +483,7 @@ fn ample_clearance_is_ample() {
             "robot_gantry",
             "robot_mount",
             "robot_obstacle",
+            "robot_person",
             "tool_phantom",
         ] {
             each.clearance.classes.remove(class);

@@ -16,6 +16,7 @@ use needlebench_engine::ENGINES;
 use needlebench_evaluation::report::Report;
 use serde::Serialize;
 
+use super::results_folder::{ResultsFolder, prepare_folder, probe_file};
 use super::{load_runnable, overrides, print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
@@ -120,7 +121,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
             return Err(wrong.into());
         }
     }
-    let folders = prepare_folders(arguments, &scenarios)?;
+    let (folders, _taken) = take_folders(arguments, &scenarios)?;
     if let Some(path) = &arguments.junit {
         probe_file(path, "--junit")?;
     }
@@ -219,26 +220,25 @@ fn scanned(
         return Ok(None);
     }
     let folder = scan.folder.join("ct");
+    prepare_folder(&folder)?;
     let progress = TerminalProgress::new(scan.quiet);
     let control = Control {
         threads: scan.jobs,
         cancel,
         progress: &progress,
     };
-    let made = match prepare_folder(&folder) {
-        Ok(()) => imaged(
-            scenario.scenario(),
-            &folder,
-            scan.overrides,
-            BuildFiles {
-                labels: true,
-                volume: false,
-            },
-            None,
-            &control,
-        ),
-        Err(finding) => Err(Stop::Refused(vec![finding])),
+    let files = BuildFiles {
+        labels: true,
+        volume: false,
     };
+    let made = imaged(
+        scenario.scenario(),
+        &folder,
+        scan.overrides,
+        files,
+        None,
+        &control,
+    );
     progress.finish();
     let checked = made.and_then(|made| {
         let runnable = Runnable::checked(made.scenario);
@@ -358,60 +358,18 @@ fn repeated_name(scenarios: &[Runnable]) -> Option<Finding> {
     })
 }
 
-/// Makes each scenario's results folder and proves that it can be written, before a long run.
-fn prepare_folders(
+/// Takes each scenario's results folder before a long run.
+fn take_folders(
     arguments: &RunArguments,
     scenarios: &[Runnable],
-) -> Result<Vec<PathBuf>, Finding> {
-    let mut folders = Vec::new();
-    for runnable in scenarios {
-        let name = &runnable.scenario().scenario.name;
-        let folder = arguments.out.join(name);
-        prepare_folder(&folder)?;
-        folders.push(folder);
-    }
-    Ok(folders)
-}
-
-/// Makes a results folder and proves that it can be written.
-pub(super) fn prepare_folder(folder: &Path) -> Result<(), Finding> {
-    std::fs::create_dir_all(folder)
-        .and_then(|()| probe_folder(folder))
-        .map_err(|error| {
-            Finding::new(
-                folder.display().to_string(),
-                format!("the results folder cannot be written: {error}"),
-            )
-            .key("--out")
-            .hint("choose another folder with --out DIR")
-        })
-}
-
-/// Proves that a file that an argument names can be written, before a long run.
-pub(super) fn probe_file(path: &Path, argument: &str) -> Result<(), Finding> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let writable = if path.is_dir() {
-        Err(std::io::ErrorKind::IsADirectory.into())
-    } else {
-        probe_folder(folder)
-    };
-    writable.map_err(|error| {
-        Finding::new(
-            path.display().to_string(),
-            format!("the file cannot be written: {error}"),
-        )
-        .key(argument)
-        .hint("choose a file in a folder that exists and can be written")
-    })
-}
-
-fn probe_folder(folder: &Path) -> std::io::Result<()> {
-    let probe = folder.join(format!(".probe-{}", std::process::id()));
-    std::fs::write(&probe, [])?;
-    std::fs::remove_file(&probe)
+) -> Result<(Vec<PathBuf>, Vec<ResultsFolder>), Failure> {
+    let folders: Vec<PathBuf> = scenarios
+        .iter()
+        .map(|runnable| arguments.out.join(&runnable.scenario().scenario.name))
+        .collect();
+    let taken = folders.iter().map(|folder| ResultsFolder::take(folder));
+    let taken = taken.collect::<Result<_, _>>()?;
+    Ok((folders, taken))
 }
 
 /// Adds the summaries to the page that GitHub Actions shows for a step.

@@ -540,6 +540,11 @@ fn by_how_much(rejection: &RejectionReport) -> String {
         String::new()
     } else if is_rule(Rule::Unreachable) {
         format!(" ({value} short)")
+    } else if is_rule(Rule::Collision) {
+        let (depth, _) = value_and_limit(-rejection.value, rejection.limit, rejection.unit);
+        format!(" ({depth} deep, {limit} to keep)")
+    } else if is_rule(Rule::TooClose) {
+        format!(" ({value} left, {limit} to keep)")
     } else {
         format!(" ({value}, limit {limit})")
     }

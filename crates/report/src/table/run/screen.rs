@@ -80,9 +80,16 @@ fn write_screen(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     Ok(())
 }
 
+/// End of the note on a link that another shape stands for.
+const STANDS_FOR_IT: &str = " stand for it";
+
 /// Whether a note is said on the first screen.
 fn is_told(report: &Report, note: &str) -> bool {
-    report.iso9283.is_some() || note.starts_with("assumed, since")
+    report.iso9283.is_some()
+        || note.starts_with("assumed, since")
+        || note.starts_with(needlebench_bench::LEFT_OUT)
+        || note.starts_with(needlebench_cell::WITHOUT_SHAPE)
+        || note.contains(STANDS_FOR_IT)
 }
 
 /// Criteria that were missed, and engines that failed.
