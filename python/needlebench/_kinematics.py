@@ -97,10 +97,11 @@ class Arm:
         arm: str | None = None,
         *,
         robot: str | os.PathLike[str] | None = None,
+        prefix: str | None = None,
         calibration: str | os.PathLike[str] | None = None,
         packages: list[str] | None = None,
     ) -> None:
-        self._native = _native.Arm(arm, robot=robot, calibration=calibration, packages=packages)
+        self._native = _native.Arm(arm, robot=robot, prefix=prefix, calibration=calibration, packages=packages)
 
     @property
     def name(self) -> str:

@@ -103,6 +103,7 @@ class Arm:
         arm: str | None = None,
         *,
         robot: _Path | None = None,
+        prefix: str | None = None,
         calibration: _Path | None = None,
         packages: list[str] | None = None,
     ) -> Arm: ...
@@ -120,6 +121,7 @@ class Scenario:
         *,
         robot: _Path | None = None,
         arm: str | None = None,
+        prefix: str | None = None,
         calibration: _Path | None = None,
         packages: list[str] | None = None,
         missing_inertia: str | None = None,

@@ -103,6 +103,7 @@ class Scenario:
         *,
         robot: str | os.PathLike[str] | None = None,
         arm: str | None = None,
+        prefix: str | None = None,
         calibration: str | os.PathLike[str] | None = None,
         packages: list[str] | None = None,
         missing_inertia: str | None = None,
@@ -113,6 +114,7 @@ class Scenario:
             path: TOML file.
             robot: URDF in place of the scenario's robot.
             arm: whose data the robot has, where the URDF does not say.
+            prefix: what stands before the names of the robot's joints, where a URDF has several arms.
             calibration: the maker's calibration of the arm (YAML).
             packages: ``NAME=DIR`` for ``package://NAME/`` in URDFs.
             missing_inertia: what to do where the URDF has no inertia.
@@ -124,6 +126,7 @@ class Scenario:
             path,
             robot=robot,
             arm=arm,
+            prefix=prefix,
             calibration=calibration,
             packages=packages,
             missing_inertia=missing_inertia,
@@ -133,6 +136,7 @@ class Scenario:
             {
                 "robot": robot,
                 "arm": arm,
+                "prefix": prefix,
                 "calibration": calibration,
                 "package_path": packages,
                 "missing_inertia": missing_inertia,

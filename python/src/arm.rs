@@ -30,6 +30,7 @@ pub(crate) fn overrides(
     py: Python<'_>,
     robot: Option<PathBuf>,
     arm: Option<String>,
+    prefix: Option<String>,
     calibration: Option<PathBuf>,
     packages: Option<Vec<String>>,
     missing_inertia: Option<&str>,
@@ -47,6 +48,7 @@ pub(crate) fn overrides(
     Ok(Overrides {
         robot_urdf: robot,
         arm,
+        prefix,
         packages,
         calibration,
         engines: engine_names(ENGINES),
@@ -66,11 +68,12 @@ pub(crate) struct Arm {
 #[pymethods]
 impl Arm {
     #[new]
-    #[pyo3(signature = (arm=None, *, robot=None, calibration=None, packages=None))]
+    #[pyo3(signature = (arm=None, *, robot=None, prefix=None, calibration=None, packages=None))]
     fn new(
         py: Python<'_>,
         arm: Option<&str>,
         robot: Option<PathBuf>,
+        prefix: Option<String>,
         calibration: Option<PathBuf>,
         packages: Option<Vec<String>>,
     ) -> PyResult<Self> {
@@ -88,7 +91,7 @@ impl Arm {
             let arm = arm.map_err(|finding| input_error(py, &[finding]))?;
             return Ok(Self { arm });
         }
-        let overrides = overrides(py, robot, None, calibration, packages, None)?;
+        let overrides = overrides(py, robot, None, prefix, calibration, packages, None)?;
         let robot = load_robot(&overrides).map_err(|finding| input_error(py, &[finding]))?;
         Ok(Self {
             arm: KinematicArm::of_robot(&robot),

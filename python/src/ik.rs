@@ -2,11 +2,11 @@
 
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 
-use nalgebra::{Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, Translation3, Unit, Vector3};
 use needlebench_kinematics::ik::{ClosedForm, Preference, Tolerance, closed_form_batch_within};
 use needlebench_kinematics::{
-    JointLimits, Joints, LimitPolicy, Pose, UrGeometry, UrModel, base_from_base_link,
-    pose_from_matrix, pose_from_rotation_vector,
+    JointLimits, Joints, LimitPolicy, Pose, UrGeometry, UrModel, pose_from_matrix,
+    pose_from_rotation_vector,
 };
 use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::exceptions::PyRuntimeError;
@@ -212,15 +212,14 @@ impl Layout {
     fn pose(numbers: &[f64]) -> Pose {
         match *numbers {
             [x, y, z, w, i, j, k] => of_quaternion(&[x, y, z, w, i, j, k]),
-            [x, y, z, rx, ry, rz] => normalised(pose_from_rotation_vector(
-                Vector3::new(x, y, z),
-                Vector3::new(rx, ry, rz),
-            )),
+            [x, y, z, rx, ry, rz] => {
+                pose_from_rotation_vector(Vector3::new(x, y, z), Vector3::new(rx, ry, rz))
+            }
             _ => {
                 let position = Vector3::new(numbers[3], numbers[7], numbers[11]);
                 // They were checked.
                 pose_from_matrix(&rotation_of(numbers), position)
-                    .map_or_else(|_| Pose::identity(), normalised)
+                    .unwrap_or_else(|_| Pose::identity())
             }
         }
     }
@@ -237,14 +236,6 @@ fn of_quaternion(&[x, y, z, w, i, j, k]: &[f64; 7]) -> Pose {
 
 fn rotation_of(pose: &[f64]) -> nalgebra::Matrix3<f64> {
     nalgebra::Matrix3::from_fn(|row, column| pose[4 * row + column])
-}
-
-/// As the command line has it before it solves, bit for bit: normalised in `base_link`. Half a turn is exact.
-fn normalised(base_from_flange: Pose) -> Pose {
-    let turn = base_from_base_link();
-    let pose = turn * base_from_flange;
-    let rotation = UnitQuaternion::new_normalize(pose.rotation.into_inner());
-    turn * Pose::from_parts(pose.translation, rotation)
 }
 
 /// What is asked of every pose.

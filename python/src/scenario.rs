@@ -34,18 +34,31 @@ pub(crate) struct Scenario {
 impl Scenario {
     /// Reads a scenario.
     #[staticmethod]
-    #[expect(clippy::needless_pass_by_value, reason = "what Python hands over")]
-    #[pyo3(signature = (path, *, robot=None, arm=None, calibration=None, packages=None, missing_inertia=None))]
+    #[expect(
+        clippy::needless_pass_by_value,
+        clippy::too_many_arguments,
+        reason = "what Python hands over"
+    )]
+    #[pyo3(signature = (path, *, robot=None, arm=None, prefix=None, calibration=None, packages=None, missing_inertia=None))]
     fn load(
         py: Python<'_>,
         path: PathBuf,
         robot: Option<PathBuf>,
         arm: Option<String>,
+        prefix: Option<String>,
         calibration: Option<PathBuf>,
         packages: Option<Vec<String>>,
         missing_inertia: Option<&str>,
     ) -> PyResult<Self> {
-        let overrides = overrides(py, robot, arm, calibration, packages, missing_inertia)?;
+        let overrides = overrides(
+            py,
+            robot,
+            arm,
+            prefix,
+            calibration,
+            packages,
+            missing_inertia,
+        )?;
         let read = py.detach(|| {
             let resolved = load_scenario(&path, &overrides)?;
             let model = ClearanceModel::new(&resolved.cell);

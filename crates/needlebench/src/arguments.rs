@@ -36,6 +36,10 @@ pub(crate) struct UrdfArguments {
     /// URDF of another UR arm, or a shipped arm's name, instead of the scenario's or the default one.
     #[arg(long, value_name = "URDF")]
     pub robot: Option<PathBuf>,
+    /// What stands before the names of the arm's links and joints, such as left_ where a URDF has two arms; the others'
+    /// joints stand still at 0.
+    #[arg(long, value_name = "PREFIX")]
+    pub prefix: Option<String>,
     /// Folder of a ROS package that the URDF's meshes name; may be given several times.
     #[arg(long, value_name = "NAME=DIR")]
     pub package_path: Vec<String>,
@@ -55,7 +59,7 @@ pub(crate) struct ArmArguments {
     #[arg(
         long,
         value_name = "MODEL",
-        conflicts_with_all = ["robot", "package_path", "missing_inertia"]
+        conflicts_with_all = ["robot", "prefix", "package_path", "missing_inertia"]
     )]
     pub arm: Option<UrModel>,
     #[command(flatten)]

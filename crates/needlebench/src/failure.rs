@@ -13,6 +13,8 @@ use crate::output::complain;
 pub(crate) enum Failure {
     /// The input is wrong.
     BadInput(Vec<Finding>),
+    /// The input is sound, and what it asks for is not met.
+    Missed(Vec<Finding>),
     /// It ended with this status, as the message says.
     Ended {
         /// What the program ends with.
@@ -47,6 +49,10 @@ impl Failure {
             Self::BadInput(findings) => {
                 print_findings(&findings);
                 ExitStatus::BadInput
+            }
+            Self::Missed(findings) => {
+                print_findings(&findings);
+                ExitStatus::CriterionFailed
             }
             Self::Ended { status, message } => {
                 complain(&message);

@@ -29,7 +29,14 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ImagingError> {
     write_whole(path, |file| file.write_all(bytes))
 }
 
-fn stream(
+/// How the names of files begin that are being written; they end with `.tmp`. A killed writer leaves them behind.
+pub const TEMPORARY_PREFIX: &str = ".needlebench-";
+
+/// Writes a file bit by bit, whole or not at all.
+///
+/// # Errors
+/// What the system says, or what `write` does; what was there stays.
+pub fn stream(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> io::Result<()> {
@@ -38,7 +45,7 @@ fn stream(
         _ => Path::new("."),
     };
     let mut builder = Builder::new();
-    builder.prefix(".").suffix(".tmp");
+    builder.prefix(TEMPORARY_PREFIX).suffix(".tmp");
     #[cfg(unix)]
     {
         // As any file: the user's mask decides who may read it.

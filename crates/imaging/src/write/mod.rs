@@ -8,6 +8,6 @@ mod nifti;
 mod stl;
 
 pub use dicom::{DicomSeries, write_dicom};
-pub use file::write_bytes;
+pub use file::{TEMPORARY_PREFIX, stream, write_bytes};
 pub use nifti::{write_label_nifti, write_nifti};
 pub use stl::write_stl;

@@ -9,7 +9,7 @@ use needlebench_cell::{Finding, Goal, ResolvedScenario, nearest_name};
 use needlebench_clearance::ClearanceModel;
 use needlebench_planning::Aim;
 
-use super::run::prepare_folder;
+use super::results_folder::ResultsFolder;
 use super::{load, overrides, print_json, print_text};
 use crate::output::{print_wide, shown};
 
@@ -87,7 +87,7 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus, Failure> {
         usize::from,
     );
     let folder = arguments.out.join(&resolved.scenario.name);
-    prepare_folder(&folder)?;
+    let _taken = ResultsFolder::take(&folder)?;
     let model = ClearanceModel::new(&resolved.cell);
     let mut atlases: Vec<(&Goal, GoalAtlas)> = Vec::new();
     for goal in goals {

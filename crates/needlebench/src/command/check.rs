@@ -51,15 +51,21 @@ struct CheckedScenario {
 /// Parses, resolves and validates scenarios, and says what can be known of them without a simulation.
 pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus, Failure> {
     let mut findings = Vec::new();
+    // What is wrong in a file, other than what the cell in it cannot do.
+    let mut bad_input = false;
     let mut notes = Vec::new();
     let mut scenarios = Vec::new();
     match overrides(&arguments.robot) {
-        Err(finding) => findings.push(finding),
+        Err(finding) => {
+            bad_input = true;
+            findings.push(finding);
+        }
         Ok(overrides) => {
             for path in &arguments.scenarios {
                 let resolved = match load(path, &overrides) {
                     Ok(resolved) => resolved,
                     Err(found) => {
+                        bad_input = true;
                         findings.extend(found.into_iter().map(|finding| placed(path, finding)));
                         continue;
                     }
@@ -81,10 +87,10 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus, Failure> {
     }
     let ok = findings.is_empty();
     if !arguments.json {
-        return if ok {
-            Ok(ExitStatus::Success)
-        } else {
-            Err(findings.into())
+        return match (ok, bad_input) {
+            (true, _) => Ok(ExitStatus::Success),
+            (false, true) => Err(findings.into()),
+            (false, false) => Err(Failure::Missed(findings)),
         };
     }
     take_findings(&findings);
@@ -95,10 +101,10 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus, Failure> {
         notes,
         scenarios,
     })?;
-    Ok(if ok {
-        ExitStatus::Success
-    } else {
-        ExitStatus::BadInput
+    Ok(match (ok, bad_input) {
+        (true, _) => ExitStatus::Success,
+        (false, true) => ExitStatus::BadInput,
+        (false, false) => ExitStatus::CriterionFailed,
     })
 }
 

@@ -18,7 +18,7 @@ use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::compare::{CompareOptions, compare as compare_reports};
 use needlebench_evaluation::{Compared, StoredReport};
 
-use super::run::probe_file;
+use super::results_folder::probe_file;
 use super::{load_runnable, print_json, print_text};
 use case::case_of_study;
 use studies::{compare_if_studies, is_study};

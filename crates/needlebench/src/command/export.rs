@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use needlebench_cell::{Finding, ResolvedScenario, nearest_name, sha256_hex};
-use needlebench_export::{ExportError, ExportedFile, Shown, gltf, mjcf, urdf};
+use needlebench_export::{ExportError, ExportedFile, Packing, Shown, gltf, mjcf, urdf};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_report::write_atomically;
 use serde::Serialize;
 
 use super::atlas::goals;
-use super::run::prepare_folder;
+use super::results_folder::prepare_folder;
 use super::{load, overrides, print_json, print_text};
 use crate::arguments::{EngineArgument, EngineParser, RobotArguments, Six};
 use crate::exit::ExitStatus;
@@ -160,6 +160,8 @@ struct Wanted<'a> {
     resolved: &'a ResolvedScenario,
     /// Name of the file that people open, without its extension.
     stem: &'a str,
+    /// Of the file that is asked for.
+    packing: Packing,
     /// Index of a goal, and a configuration of it.
     chosen: Option<(usize, Configuration)>,
     /// A posture of the user's own.
@@ -186,7 +188,7 @@ impl Wanted<'_> {
                 unreachable!("motions are exported after a run")
             }
             Format::Urdf => urdf(self.resolved, self.stem),
-            Format::Gltf => gltf(self.resolved, self.stem, &self.shown()),
+            Format::Gltf => gltf(self.resolved, self.stem, &self.shown(), self.packing),
         }
     }
 }
@@ -206,6 +208,11 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus, Failure>
     let wanted = Wanted {
         resolved: &resolved,
         stem: &stem,
+        packing: if extension.eq_ignore_ascii_case(".gltf") {
+            Packing::Separate
+        } else {
+            Packing::Binary
+        },
         chosen,
         joints,
     };

@@ -13,7 +13,7 @@ use needlebench_evaluation::iso9283::{
 use needlebench_evaluation::report::Verdict;
 use serde::Serialize;
 
-use super::run::probe_file;
+use super::results_folder::probe_file;
 use super::{print_json, print_text};
 
 use crate::arguments::PicturesArguments;

@@ -116,7 +116,11 @@ pub(crate) fn ik(arguments: &IkArguments) -> Result<ExitStatus, Failure> {
     } else {
         print_text(&answer.text())?;
     }
-    Ok(ExitStatus::Success)
+    // A pose that no posture reaches has no answer.
+    Ok(match answer.count {
+        0 => ExitStatus::CriterionFailed,
+        _ => ExitStatus::Success,
+    })
 }
 
 fn solve(arguments: &IkArguments) -> Result<IkAnswer, Failure> {

@@ -15,6 +15,7 @@ mod paper;
 mod record_plan;
 mod replay;
 mod report;
+mod results_folder;
 mod run;
 mod schema;
 mod search;
@@ -86,6 +87,7 @@ fn urdf_overrides(arguments: &UrdfArguments) -> Result<Overrides, Finding> {
     Ok(Overrides {
         robot_urdf: arguments.robot.clone(),
         arm: None,
+        prefix: arguments.prefix.clone(),
         packages: PackagePaths::from_arguments(&arguments.package_path)?,
         calibration: arguments.calibration.clone(),
         engines: engine_names(ENGINES),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 
-use super::run::prepare_folder;
+use super::results_folder::prepare_folder;
 use super::{print_json, print_text};
 use crate::output::shown;
 

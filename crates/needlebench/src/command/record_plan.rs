@@ -22,7 +22,7 @@ use needlebench_planning::excitation::{
 use needlebench_report::files::{Folder, write_plan};
 use needlebench_report::table::excitation::plan_text;
 
-use super::run::prepare_folder;
+use super::results_folder::prepare_folder;
 use super::{overrides, print_json, print_text};
 use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;

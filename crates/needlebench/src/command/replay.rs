@@ -19,7 +19,7 @@ use needlebench_recorded::{
 use needlebench_report::files::{CALIBRATION_FILE, Folder, write_replay};
 use needlebench_report::table::replay::text;
 
-use super::run::prepare_folder;
+use super::results_folder::ResultsFolder;
 use super::{overrides, print_json, print_text};
 use crate::arguments::{EngineArgument, EngineParser, PicturesArguments, RobotArguments};
 use crate::clock::elapsed;
@@ -198,7 +198,7 @@ fn prepared(arguments: &ReplayArguments) -> Result<Prepared, Failure> {
     };
     let name = file_name(&arguments.log);
     let folder = arguments.out.join(name);
-    prepare_folder(&folder)?;
+    let _taken = ResultsFolder::take(&folder)?;
     let run = read_log(&arguments.log, &options).map_err(|findings| {
         match FileKind::of(&arguments.log) {
             Some(FileKind::Mcap) => findings,

@@ -9,7 +9,7 @@ use needlebench_cell::judgement::Judgement;
 use needlebench_report::credibility::credibility_markdown;
 use needlebench_report::files::Folder;
 
-use super::run::prepare_folder;
+use super::results_folder::prepare_folder;
 use super::{print_as_it_is, print_json};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;

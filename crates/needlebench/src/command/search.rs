@@ -7,14 +7,15 @@ use anyhow::{Context, Result};
 use clap::Args;
 use needlebench_cell::study::load_study;
 use needlebench_study::search::{
-    CaseWorth, Generation, GenerationDesign, Judge, SearchError, SearchLog, search as search_for,
+    Answer, CaseWorth, Generation, GenerationDesign, Judge, SearchError, SearchLog,
+    search as search_for,
 };
 use needlebench_study::{
     FactorValue, Manifest, ParquetResults, Results as _, RunEnd, Shard, Status, StudyError,
     StudyRun, merge,
 };
 
-use super::run::prepare_folder;
+use super::results_folder::prepare_folder;
 use super::study::{ShardArgument, shard_of, show};
 use super::{overrides, print_json, print_text};
 use crate::arguments::RobotArguments;
@@ -115,7 +116,12 @@ pub(crate) fn search(arguments: &SearchArguments) -> Result<ExitStatus, Failure>
     } else {
         print_text(&format!("{text}results: {}", shown(&folder)))?;
     }
-    Ok(ExitStatus::Success)
+    let recommended = log.answer.as_ref().is_some_and(Answer::is_recommended);
+    Ok(if recommended {
+        ExitStatus::Success
+    } else {
+        ExitStatus::CriterionFailed
+    })
 }
 
 /// Computes generations as studies, each in a folder of its own.

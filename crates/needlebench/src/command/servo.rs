@@ -11,7 +11,7 @@ use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 use needlebench_planning::Planner;
 use std::path::PathBuf;
 
-use super::run::prepare_folder;
+use super::results_folder::ResultsFolder;
 use super::{load, overrides, print_json, print_text};
 
 use crate::exit::ExitStatus;
@@ -52,7 +52,7 @@ pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus, Failure> {
     let wanted = wanted_joints(arguments.joint.as_deref())?;
     let resolved = load(&arguments.scenario, &overrides)?;
     let folder = arguments.out.join(&resolved.scenario.name).join("servo");
-    prepare_folder(&folder)?;
+    let _taken = ResultsFolder::take(&folder)?;
     let (described, posture) = posture(&resolved)?;
     let servo = needlebench_bench::servo_of(&resolved);
     let timestep_s = resolved.scenario.engines.timestep_ms * 1e-3;

@@ -16,7 +16,8 @@ use needlebench_study::{
     StudyError, StudyRun, merge as merge_shards, write_csv,
 };
 
-use super::run::{Outputs, Printed, prepare_folder, probe_file, run_into};
+use super::results_folder::{prepare_folder, probe_file};
+use super::run::{Outputs, Printed, run_into};
 use super::{overrides, print_json, print_text};
 use crate::arguments::{RobotArguments, leave};
 use crate::clock::elapsed;
@@ -189,13 +190,14 @@ fn prepare_outputs(
     folder: &Path,
     prepared: &PreparedStudy,
     wanted: &StudyResultArguments,
-) -> Result<(), Finding> {
+) -> Result<(), Failure> {
     if let Some(request) = wanted.table.request() {
         check_study(&request, prepared)?;
     }
     prepare_folder(folder)?;
     let junit = wanted.junit.as_deref();
-    junit.map_or(Ok(()), |path| probe_file(path, "--junit"))
+    junit.map_or(Ok(()), |path| probe_file(path, "--junit"))?;
+    Ok(())
 }
 
 /// Refuses a study that will take long, and one whose cases cannot be computed.

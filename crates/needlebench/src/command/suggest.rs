@@ -21,7 +21,7 @@ use needlebench_report::write_atomically;
 use serde::Serialize;
 
 use super::record_plan::Three;
-use super::run::prepare_folder;
+use super::results_folder::prepare_folder;
 use super::{overrides, print_json, print_text};
 use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;

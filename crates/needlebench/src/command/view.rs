@@ -1,5 +1,6 @@
 //! `needlebench view`.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -11,9 +12,10 @@ use needlebench_bench::ct::{BuildFiles, VOLUME_FILE, imaged};
 use needlebench_bench::{Control, Stop};
 use needlebench_cell::{Finding, Overrides, load_scenario};
 use needlebench_viewer::{Case, Server, Stopper};
+use tempfile::NamedTempFile;
 
 use crate::arguments::RobotArguments;
-use crate::command::run::prepare_folder;
+use crate::command::results_folder::ResultsFolder;
 use crate::command::{overrides, print_text};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
@@ -28,8 +30,8 @@ Example: needlebench view out/patient
 DIR is what `needlebench ct build SCAN --out DIR` made. A SCENARIO with a section [ct] is scanned and built first, into
 out/NAME/view. The address that is printed has a secret in it: who has it can see the patient, nobody else on this
 machine can. Nothing leaves the machine, and nothing is written outside the folder: session.toml (what was decided; it is
-there again the next time), session.lock (one program at a time), planned.toml (the plan, for `run`) and runs/ (what was
-simulated from the page).
+there again the next time), session.lock (one program at a time), planned.toml (the plan, for `run`), runs/ (what was
+simulated from the page) and, while it runs, open-*.html (what the browser is sent to).
 
 Ctrl-C ends it. Not a medical device.";
 
@@ -61,12 +63,8 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus, Failure> {
         }
     })
     .context("cannot watch for interrupts")?;
-    let opened = folder(&arguments.path, &overrides, &cancel).and_then(|folder| {
-        let case = Case::open(&folder, &overrides, &cancel)?;
-        Ok((folder, case))
-    });
-    let (folder, case) =
-        opened.map_err(|stop| Failure::of_stop(stop, "interrupted while the scan was made"))?;
+    let folder = folder(&arguments.path, &overrides, &cancel)?;
+    let case = Case::open(&folder, &overrides, &cancel).map_err(stopped)?;
     let program = std::env::current_exe().context("this program does not find itself")?;
     let server = Server::new(case, arguments.port, program).map_err(|error| {
         let hint = error.hint();
@@ -86,15 +84,22 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus, Failure> {
         "{url}\nthe planning page of {}; Ctrl-C ends it",
         shown(&folder)
     ))?;
-    if !arguments.no_open {
-        open(&url);
+    let page = (!arguments.no_open).then(|| redirect(&folder, &url));
+    // Without one the printed address is enough.
+    let page = page.and_then(Result::ok);
+    if let Some(page) = &page {
+        open(page.path());
     }
-    server.run().map_err(anyhow::Error::from)?;
+    server.run();
     Ok(ExitStatus::Success)
 }
 
+fn stopped(stop: Stop) -> Failure {
+    Failure::of_stop(stop, "interrupted while the scan was made")
+}
+
 /// The folder of a patient, built if need be.
-fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<PathBuf, Stop> {
+fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<PathBuf, Failure> {
     if path.is_dir() {
         return Ok(path.to_owned());
     }
@@ -110,10 +115,10 @@ fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<Pat
              `needlebench ct build out/ct/ct.nii.gz --room {name} --markers out/ct/marker_list.toml --lesion NAME=X,Y,Z \
              --out out/patient`, then `needlebench view out/patient`"
         ));
-        return Err(Stop::Refused(vec![finding]));
+        return Err(finding.into());
     }
     let folder = Path::new("out").join(&resolved.scenario.name).join("view");
-    prepare_folder(&folder).map_err(|finding| Stop::Refused(vec![finding]))?;
+    let _taken = ResultsFolder::take_private(&folder)?;
     let progress = TerminalProgress::new(false);
     let control = Control {
         threads: threads(None),
@@ -126,11 +131,28 @@ fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<Pat
     };
     let made = imaged(&resolved, &folder, overrides, files, None, &control);
     progress.finish();
-    made.map(|_| folder)
+    made.map(|_| folder).map_err(stopped)
 }
 
-/// Opens an address in the browser; where there is none the printed address is enough.
-fn open(url: &str) {
+/// A page in the folder that leads to an address, readable by its owner alone: on a command line everybody could read the
+/// secret. It goes when the server ends.
+fn redirect(folder: &Path, url: &str) -> std::io::Result<NamedTempFile> {
+    let mut page = tempfile::Builder::new()
+        .prefix("open-")
+        .suffix(".html")
+        .tempfile_in(folder)?;
+    writeln!(
+        page,
+        "<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\">\n\
+         <meta http-equiv=\"refresh\" content=\"0; url={url}\">\n\
+         <title>needlebench</title><a href=\"{url}\">planning page</a>"
+    )?;
+    page.flush()?;
+    Ok(page)
+}
+
+/// Opens a page in the browser.
+fn open(page: &Path) {
     let (program, before): (&str, &[&str]) = if cfg!(target_os = "macos") {
         ("open", &[])
     } else if cfg!(windows) {
@@ -140,7 +162,7 @@ fn open(url: &str) {
     };
     let _ = Command::new(program)
         .args(before)
-        .arg(url)
+        .arg(page)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(Stdio::null())

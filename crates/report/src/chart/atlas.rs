@@ -36,9 +36,10 @@ const WORKS: Rgb = [0, 114, 178];
 const NO_POSTURE: Rgb = [200, 203, 207];
 
 /// Rules in the order of the legend with their colours, which people with any colour vision tell apart.
-const RULES: [(Rule, Rgb); 8] = [
+const RULES: [(Rule, Rgb); 9] = [
     (Rule::NeedleRoute, [150, 50, 110]),
     (Rule::Collision, [213, 94, 0]),
+    (Rule::TooClose, [255, 160, 122]),
     (Rule::NeedleCorridor, [255, 200, 60]),
     (Rule::Singular, [204, 121, 167]),
     (Rule::JointLimit, [120, 66, 20]),

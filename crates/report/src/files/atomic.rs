@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use tempfile::Builder;
+use needlebench_imaging::write::stream;
 
 /// Writes a file beside its place first and then renames it, so that nobody ever sees half of it.
 /// Who may read it is decided by the user's mask, as of any file.
@@ -19,24 +19,10 @@ pub(super) fn stream_atomically(
     path: &Path,
     write: &mut dyn FnMut(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = Builder::new();
-    builder.prefix(".").suffix(".tmp");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = io::BufWriter::new(builder.tempfile_in(folder)?);
-    write(&mut file)?;
-    let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
-    let written = file.persist(path)?;
+    stream(path, |file| write(file))?;
     tracing::debug!(
         file = %path.display(),
-        bytes = written.metadata().map_or(0, |file| file.len()),
+        bytes = path.metadata().map_or(0, |file| file.len()),
         "written"
     );
     Ok(())

@@ -34,6 +34,8 @@ pub struct SearchDocument<'a> {
     classes: Vec<&'static str>,
     /// Cases of all choices with all layouts; none of choices with ranges.
     grid_cases: Option<u64>,
+    /// Number of the candidate to choose; none before the end, and where the best one works in no layout.
+    recommended: Option<usize>,
     #[serde(flatten)]
     log: &'a SearchLog,
 }
@@ -53,6 +55,11 @@ impl<'a> SearchDocument<'a> {
                 .map(needlebench_cell::ClearanceClass::name)
                 .collect(),
             grid_cases: search.grid_cases(),
+            recommended: log
+                .answer
+                .as_ref()
+                .filter(|answer| answer.is_recommended())
+                .map(|answer| answer.winner),
             log,
         }
     }

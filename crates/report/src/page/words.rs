@@ -5,7 +5,7 @@ use needlebench_evaluation::metric::metrics;
 use serde_json::{Map, Value, json};
 
 /// Classes of clearance, rules and criteria, besides those that are metrics.
-const NAMES: [(&str, &str); 29] = [
+const NAMES: [(&str, &str); 31] = [
     ("robot_phantom", "arm to patient"),
     ("tool_phantom", "tool to patient"),
     ("guide_standoff", "guide to skin"),
@@ -13,6 +13,7 @@ const NAMES: [(&str, &str); 29] = [
     ("robot_gantry", "arm to gantry"),
     ("robot_mount", "arm to its mount"),
     ("robot_obstacle", "arm to obstacles"),
+    ("robot_person", "arm to people"),
     ("self", "arm to itself"),
     ("needle_corridor", "space behind the guide"),
     ("needle_route", "needle's way in"),
@@ -21,6 +22,7 @@ const NAMES: [(&str, &str); 29] = [
     ("nearest_only", "only nearly reached"),
     ("joint_limit", "joint limit"),
     ("singular", "singular posture"),
+    ("too_close", "too close"),
     ("no_motion", "no motion found"),
     ("expected", "outcome as expected"),
     ("allow_contact", "no contact"),

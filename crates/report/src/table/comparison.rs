@@ -169,7 +169,7 @@ pub fn comparison_screen(comparison: &Comparison) -> String {
     if !judged.is_empty() {
         lines.push(String::new());
         lines.push(
-            "of configurations that work in both, by metrics that are judged or ranked by"
+            "of configurations that moved in both, by metrics that are judged or ranked by"
                 .to_owned(),
         );
         lines.push(metrics_table(&judged).to_string());
@@ -195,11 +195,11 @@ fn failure_line(failure: &ComparisonFailure) -> String {
     }
 }
 
-/// Metrics that changed of configurations that work in both results: others have nothing to compare.
+/// Metrics that changed of configurations that moved in both results, whether or not they met the criteria: others have nothing to compare.
 fn changed_rows(goal: &GoalComparison) -> Vec<(&ConfigurationComparison, &MetricComparison)> {
-    let works = |status: &Option<String>| status.as_deref().is_some_and(|it| it != "rejected");
+    let moved = |status: &Option<String>| status.as_deref().is_some_and(|it| it != "rejected");
     let mut changed = rows(goal, false);
-    changed.retain(|(each, _)| works(&each.status_a) && works(&each.status_b));
+    changed.retain(|(each, _)| moved(&each.status_a) && moved(&each.status_b));
     changed
 }
 
@@ -446,7 +446,7 @@ pub(crate) fn verdict(comparison: &Comparison) -> String {
         count => format!("{count} losses"),
     };
     let mut text = format!(
-        "{}: {losses}; {goals} {}, {configurations} configurations; of those that work in both {} values are better, {} worse",
+        "{}: {losses}; {goals} {}, {configurations} configurations; of those that moved in both {} values are better, {} worse",
         capitals(comparison.verdict),
         if goals == 1 { "goal" } else { "goals" },
         count(&[Change::Better, Change::New]),

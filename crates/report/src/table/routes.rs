@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use needlebench_bench::routes::{ConfigurationAnswer, RouteAnswer, RoutePlan, WhyNot};
+use needlebench_bench::routes::{ConfigurationAnswer, RouteAnswer, RoutePlan, SAME_ODDS, WhyNot};
 use needlebench_bench::suggest::Refused;
 use needlebench_cell::{part_in_words, reason_in_words};
 
@@ -93,7 +93,11 @@ fn best(route: &RouteAnswer) -> Option<&ConfigurationAnswer> {
 fn choice(plan: &RoutePlan, route: &RouteAnswer, index: usize) -> String {
     let mut text = format!("route {}, {:.0} mm deep", index + 1, route.depth_m * 1e3);
     if let Some(best) = best(route) {
-        let _ = write!(text, ", in {}", best.label);
+        let _ = write!(
+            text,
+            ", served in {} of 8 configurations, by postures alone best in {}",
+            route.working, best.label
+        );
         if let Some(clearance_m) = best.clearance_m {
             let _ = write!(text, ": clearance {:.1} mm", clearance_m * 1e3);
         }
@@ -112,19 +116,32 @@ fn choice(plan: &RoutePlan, route: &RouteAnswer, index: usize) -> String {
                 plan.sigmas
             );
         }
-        let _ = write!(text, " (postures only, motions not planned)");
+        let _ = write!(
+            text,
+            " (motions not planned: `run` of the plan ranks the configurations by all that it measures)"
+        );
     }
     text
 }
 
 fn refused_route(why_not: &WhyNot) -> String {
     let mut text = format!(
-        "route {} is better and not served: {}",
+        "route {} comes first and is not served: {}",
         why_not.route + 1,
         counts(&why_not.reasons)
     );
     if let Some(odds) = why_not.odds_to_chosen {
-        let _ = write!(text, "; its odds are {odds:.2} of those of the chosen one");
+        let _ = if libm::log(odds).abs() < SAME_ODDS {
+            write!(
+                text,
+                "; its odds are those of the chosen one as far as odds are known ({odds:.2} times), and it has more to spare"
+            )
+        } else {
+            write!(
+                text,
+                "; its odds are {odds:.2} times those of the chosen one"
+            )
+        };
     }
     if let Some(freeing) = &why_not.freeing {
         let freed: Vec<String> = freeing

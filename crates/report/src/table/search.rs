@@ -21,6 +21,17 @@ pub(crate) fn search_text(search: &PreparedSearch, log: &SearchLog) -> String {
     };
     let mut text = String::new();
     let objective = log.objectives[0];
+    if !answer.is_recommended() {
+        let _ = writeln!(
+            text,
+            "{}",
+            wrapped(&format!(
+                "{name}: none is recommended: the best of {} candidates works in none of {} layouts",
+                log.candidates.len(),
+                answer.rate.cases
+            ))
+        );
+    }
     let _ = writeln!(
         text,
         "{}",

@@ -12,7 +12,7 @@ use needlebench_study::compare::{
 };
 use needlebench_study::{MANIFEST_FILE, ParquetResults, RESULTS_FILE, ResultsError};
 
-use super::super::run::probe_file;
+use super::super::results_folder::probe_file;
 use super::super::{print_json, print_text};
 use super::CompareArguments;
 use super::thresholds::{Given, thresholds};

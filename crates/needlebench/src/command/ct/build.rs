@@ -28,7 +28,7 @@ use serde::Serialize;
 
 use super::info::ReadArguments;
 use crate::arguments::{PicturesArguments, RobotArguments};
-use crate::command::run::prepare_folder;
+use crate::command::results_folder::ResultsFolder;
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
@@ -201,7 +201,7 @@ pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus, Failu
             }
             Ok(ExitStatus::Success)
         }
-        Err(Stop::Refused(findings)) if arguments.json => {
+        Err(Failure::BadInput(findings)) if arguments.json => {
             print_json(&BuildAnswer {
                 schema_version: 1,
                 ok: false,
@@ -212,14 +212,28 @@ pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus, Failu
             })?;
             Ok(ExitStatus::BadInput)
         }
-        Err(stop) => Err(Failure::of_stop(
-            stop,
-            "interrupted: there is no scenario.toml yet",
-        )),
+        Err(failure) => Err(failure),
     }
 }
 
-fn make(arguments: &BuildArguments, control: &Control<'_>) -> Result<(ScanBuild, PathBuf), Stop> {
+/// What a scan is read with.
+struct Given {
+    markers: Option<MarkerList>,
+    names: Option<Vec<(u16, String)>>,
+    room: OwnRoom,
+}
+
+fn make(
+    arguments: &BuildArguments,
+    control: &Control<'_>,
+) -> Result<(ScanBuild, PathBuf), Failure> {
+    let stopped = |stop| Failure::of_stop(stop, "interrupted: there is no scenario.toml yet");
+    let given = given(arguments).map_err(stopped)?;
+    let _taken = ResultsFolder::take_private(&arguments.out)?;
+    make_of(arguments, given, control).map_err(stopped)
+}
+
+fn given(arguments: &BuildArguments) -> Result<Given, Stop> {
     let overrides = overrides(&arguments.robot)?;
     let markers = arguments
         .markers
@@ -232,8 +246,23 @@ fn make(arguments: &BuildArguments, control: &Control<'_>) -> Result<(ScanBuild,
         .map(read_label_names)
         .transpose();
     let names = names.map_err(|error| Stop::of_scan(&arguments.path, error))?;
-    let room = room(arguments, &overrides)?;
-    prepare_folder(&arguments.out)?;
+    Ok(Given {
+        markers,
+        names,
+        room: room(arguments, &overrides)?,
+    })
+}
+
+fn make_of(
+    arguments: &BuildArguments,
+    given: Given,
+    control: &Control<'_>,
+) -> Result<(ScanBuild, PathBuf), Stop> {
+    let Given {
+        markers,
+        names,
+        room,
+    } = given;
     control.progress.message("reading");
     let path = &arguments.path;
     let mut read = arguments

@@ -26,7 +26,7 @@ use serde::Serialize;
 
 use crate::arguments::{PicturesArguments, RobotArguments};
 use crate::command::record_plan::Three;
-use crate::command::run::prepare_folder;
+use crate::command::results_folder::prepare_folder;
 use crate::command::suggest::{ChosenEntry, set_entries, unplaced};
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;

@@ -22,7 +22,7 @@ use needlebench_report::write_atomically;
 use serde::Serialize;
 
 use crate::arguments::RobotArguments;
-use crate::command::run::prepare_folder;
+use crate::command::results_folder::ResultsFolder;
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
@@ -269,7 +269,7 @@ struct Listed<'l, T> {
 pub(crate) fn synth(arguments: &SynthArguments) -> Result<ExitStatus, Failure> {
     let subject = subject(arguments)?;
     let scan = described(arguments, &subject)?;
-    prepare_folder(&arguments.out)?;
+    let _taken = ResultsFolder::take(&arguments.out)?;
     let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(arguments.json);
     let made = make(arguments, &scan, &cancel, &progress);

@@ -17,7 +17,7 @@ use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
 use crate::progress::TerminalProgress;
 
-use super::super::run::prepare_folder;
+use super::super::results_folder::prepare_folder;
 
 /// Engine that moves what is exported, where nobody names one: it needs nothing besides the program.
 const ENGINE: &str = "rapier";

@@ -613,7 +613,7 @@ class Explore {
     if (limit === null) return NB.el('span', { class: 'soft', text: 'no limit' });
     return distance >= limit
       ? NB.el('span', { class: 'good', text: '\u2713 kept' })
-      : NB.el('span', { class: 'bad', text: distance < 0 ? '\u2717 overlap' : '\u2717 too near' });
+      : NB.el('span', { class: 'bad', text: distance < 0 ? '\u2717 collides' : '\u2717 too close' });
   }
 
   draw() {
@@ -690,7 +690,7 @@ class Explore {
     const words = {
       works: ['good', '\u2713 limits kept'],
       misses: ['bad', '\u2717 limit missed'],
-      too_near: ['bad', '\u2717 too near'],
+      too_near: ['bad', '\u2717 too close'],
       singular: ['bad', '\u2717 near a singularity'],
       joint_limit: ['off', '\u2013 beyond a joint limit'],
       merged: ['off', '\u2013 same as another'],

@@ -190,7 +190,7 @@ NB.sections = /** @type {RunSections} */ (
           unit: 'mm',
           numeric: true,
           cell: (c) => NB.mm(c.budget?.total.at_target.radius_95_m, 2),
-          help: 'distance that 95 % of the draws stay within',
+          help: 'distance that 95 % of all arms and patients stay within',
         },
         {
           title: 'At the skin',

@@ -1,0 +1,168 @@
+//! Folders of results: made, proven to be writable, and of one writer at a time.
+
+use std::fs::{File, TryLockError};
+use std::io::ErrorKind;
+use std::path::Path;
+
+use needlebench_cell::Finding;
+use needlebench_imaging::write::TEMPORARY_PREFIX;
+
+use crate::exit::ExitStatus;
+use crate::failure::Failure;
+
+/// How often and after how long a folder in use is looked at again: what has just ended may still hold it.
+const LOOKS: u32 = 10;
+const LOOK: std::time::Duration = std::time::Duration::from_millis(50);
+
+/// Deepest folder within a folder of results in which files are left over: `ct/surfaces`.
+const DEEPEST: u32 = 2;
+
+/// A folder that this process alone writes results into, for as long as it has this. The system lets go of it however the
+/// program ends; nothing is left in the folder.
+#[derive(Debug)]
+#[must_use = "others may write into the folder once it is dropped"]
+pub(crate) struct ResultsFolder {
+    /// None where folders cannot be locked.
+    _lock: Option<File>,
+}
+
+impl ResultsFolder {
+    /// Makes a folder, proves that it can be written, keeps other writers out, and removes what killed ones have left of
+    /// files that they had not finished.
+    ///
+    /// # Errors
+    /// It cannot be made or written; another process writes into it.
+    pub(crate) fn take(folder: &Path) -> Result<Self, Failure> {
+        prepare_folder(folder)?;
+        let taken = Self {
+            _lock: lock(folder)?,
+        };
+        clear(folder, 0);
+        Ok(taken)
+    }
+
+    /// The same of a folder for what is known of a patient: one that is made is its owner's alone.
+    ///
+    /// # Errors
+    /// As [`ResultsFolder::take`].
+    pub(crate) fn take_private(folder: &Path) -> Result<Self, Failure> {
+        make_private(folder);
+        Self::take(folder)
+    }
+}
+
+/// The lock is the system's on the folder itself. Where it has none for folders, there is none.
+fn lock(folder: &Path) -> Result<Option<File>, Failure> {
+    let Ok(file) = File::open(folder) else {
+        return Ok(None);
+    };
+    for _ in 0..LOOKS {
+        match file.try_lock() {
+            Ok(()) => return Ok(Some(file)),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(LOOK),
+            Err(TryLockError::Error(_)) => return Ok(None),
+        }
+    }
+    Err(Failure::Ended {
+        status: ExitStatus::EnvironmentFailed,
+        message: format!(
+            "error: {}: another process is writing here\nhint: wait for it or choose another folder",
+            folder.display()
+        ),
+    })
+}
+
+/// Removes files that were not finished; what cannot be removed stays.
+fn clear(folder: &Path, depth: u32) {
+    for entry in folder.read_dir().into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        match entry.file_type() {
+            Ok(kind) if kind.is_dir() && depth < DEEPEST => clear(&entry.path(), depth + 1),
+            Ok(kind)
+                if kind.is_file()
+                    && name.starts_with(TEMPORARY_PREFIX)
+                    && name.ends_with(".tmp") =>
+            {
+                let _ = std::fs::remove_file(entry.path());
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Makes a folder and proves that it can be written.
+///
+/// # Errors
+/// The folder cannot be one; the disk is full or away, which passes.
+pub(crate) fn prepare_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .and_then(|()| probe_folder(folder))
+        .map_err(|error| {
+            let message = format!("the results folder cannot be written: {error}");
+            let passes = matches!(
+                error.kind(),
+                ErrorKind::StorageFull
+                    | ErrorKind::QuotaExceeded
+                    | ErrorKind::StaleNetworkFileHandle
+                    | ErrorKind::TimedOut
+                    | ErrorKind::ResourceBusy
+                    | ErrorKind::Interrupted
+            );
+            if passes {
+                return Failure::Ended {
+                    status: ExitStatus::EnvironmentFailed,
+                    message: format!(
+                        "error: {}: {message}\nhint: make room, or choose another folder with --out DIR",
+                        folder.display()
+                    ),
+                };
+            }
+            Finding::new(folder.display().to_string(), message)
+                .key("--out")
+                .hint("choose another folder with --out DIR")
+                .into()
+        })
+}
+
+fn make_private(folder: &Path) {
+    #[cfg(unix)]
+    if !folder.exists() {
+        use std::os::unix::fs::DirBuilderExt;
+        // What keeps it from being made is said later.
+        let _ = folder.parent().map_or(Ok(()), std::fs::create_dir_all);
+        let _ = std::fs::DirBuilder::new().mode(0o700).create(folder);
+    }
+    #[cfg(not(unix))]
+    let _ = folder;
+}
+
+/// Proves that a file that an argument names can be written, before a long run.
+///
+/// # Errors
+/// It cannot.
+pub(crate) fn probe_file(path: &Path, argument: &str) -> Result<(), Finding> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let writable = if path.is_dir() {
+        Err(ErrorKind::IsADirectory.into())
+    } else {
+        probe_folder(folder)
+    };
+    writable.map_err(|error| {
+        Finding::new(
+            path.display().to_string(),
+            format!("the file cannot be written: {error}"),
+        )
+        .key(argument)
+        .hint("choose a file in a folder that exists and can be written")
+    })
+}
+
+fn probe_folder(folder: &Path) -> std::io::Result<()> {
+    let probe = folder.join(format!(".probe-{}", std::process::id()));
+    std::fs::write(&probe, [])?;
+    std::fs::remove_file(&probe)
+}
