@@ -97,6 +97,7 @@ impl Mechanism {
         let is_free = |i: usize| i < self.free_joints.len();
         let armature = Joints::from_fn(|i, _| if is_free(i) { 0.0 } else { self.resting_kgm2 });
         let robot = Robot {
+            unseen: Vec::new(),
             name: "mechanism".into(),
             world_from_base_link: Pose::identity(),
             chain,
@@ -165,6 +166,7 @@ fn source() -> ModelSource {
 /// A tool without mass or shape: the flange is the ball's centre.
 fn tool() -> Tool {
     Tool {
+        unseen: Vec::new(),
         name: "none".into(),
         solids: Vec::new(),
         guide_solids: Vec::new(),

@@ -551,7 +551,17 @@ await other.close();
 await page.getByRole('button', { name: 'Take route 1' }).click();
 await settled(page);
 await page.getByRole('button', { name: 'Save plan' }).click();
-await page.waitForFunction(() => /Saved as planned.toml/.test(document.body.innerText));
+await page.waitForFunction(() => /Saved as planned.toml|Save it as refused/.test(document.body.innerText));
+const agree = page.getByRole('button', { name: 'Save it as refused' });
+const refusal = await page.evaluate(() => PLAN.planner.route?.refusal);
+assert.equal(Boolean(refusal), (await agree.count()) > 0, 'a needle that is refused is asked about, and no other');
+if (refusal) {
+  assert.match(await page.innerText('.side'), /This needle is refused/);
+  assert.doesNotMatch(await page.innerText('table.choose'), /\byes\b/);
+  await page.screenshot({ path: join(out, 'view-refused.png') });
+  await agree.click();
+  await page.waitForFunction(() => /Saved as planned.toml/.test(document.body.innerText));
+}
 const checked = JSON.parse(
   execFileSync(program, ['check', join(folder, 'planned.toml'), '--json'], { encoding: 'utf8' }),
 );

@@ -109,6 +109,10 @@ def check_dynamics(cell: Cell, path: str, postures: list[Array], tally: Tally) -
     model.gravity.linear[:] = mjcf.opt.gravity
     moving = sum(mjcf.body_mass[mjcf.body(name).id] for name in LINKS)
     tally.add(sum(each.mass for each in model.inertias) - moving, f"{cell.name}: mass")
+    # MuJoCo weighs the shapes of a link that does not say its mass.
+    text = path.read_text().replace("package://", f"{path.parent}/")
+    read = mujoco.MjModel.from_xml_string(text)
+    tally.add(sum(read.body_mass) - moving, f"{cell.name}: mass by MuJoCo's reading")
     for q in postures:
         full = joint_positions(model, q)
         pin.crba(model, data, full)

@@ -160,7 +160,7 @@ fn a_goal_out_of_reach_is_a_finding_with_what_is_missing() {
         "[-280, 900, 1050]",
     );
     let bench = Bench::with_scenario(&text);
-    let answer = bench.run("check s.toml --json").exits_with(2).json();
+    let answer = bench.run("check s.toml --json").exits_with(1).json();
     assert_eq!(answer["ok"], false);
     let findings = answer["findings"].list();
     assert_eq!(findings.len(), 4, "{findings:?}");
@@ -198,7 +198,7 @@ fn a_route_through_bone_is_a_finding() {
         "[-108.9, -76.4, 75.8]",
     );
     let bench = Bench::with_scenario(&text);
-    let answer = bench.run("check s.toml --json").exits_with(2).json();
+    let answer = bench.run("check s.toml --json").exits_with(1).json();
     let findings = answer["findings"].list();
     let message = findings[0]["message"].word();
     holds(message, ["needle", "rib_"]);

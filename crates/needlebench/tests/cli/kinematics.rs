@@ -160,7 +160,7 @@ fn goal_of_a_scenario_is_solved_like_its_pose() {
 fn unreachable_pose_says_how_much_is_missing() {
     let bench = Bench::new();
     let answer = bench.run("ik --pose 0.9,0,0.1,0,0,0 --json");
-    let answer = answer.exits_with(0).json();
+    let answer = answer.exits_with(1).json();
     assert_eq!(answer["count"], 0);
     assert!(solutions(&answer).is_empty());
     assert_eq!(answer["certificate"], "nearest_only");
@@ -285,7 +285,7 @@ fn iteration_limit_is_kept_and_its_row_is_no_solution() {
             "ik --pose {TABLE_3_POSE} --method {method} --max-iterations {limit} --json"
         ))
     };
-    let answer = run("gauss-newton", "1").exits_with(0).json();
+    let answer = run("gauss-newton", "1").exits_with(1).json();
     assert_eq!(answer["count"], 0);
     assert_eq!(answer["certificate"], "not_converged");
     assert_eq!(answer["nearest"][0]["kind"], "nearest");

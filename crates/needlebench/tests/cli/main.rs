@@ -53,3 +53,4 @@ mod search;
 mod study;
 mod suggest;
 mod support;
+mod unjudged;

@@ -158,3 +158,30 @@ fn the_summary_takes_no_markup_from_a_description() {
     let line = summary.lines().nth(2).unwrap();
     assert_eq!(line, "\\<b>bold\\</b> \\*\\*x\\*\\* # head \\\\u{1b}[31m");
 }
+
+#[cfg(unix)]
+#[test]
+fn a_folder_of_results_has_one_writer_and_keeps_nothing_of_killed_ones() {
+    let bench = Bench::with_scenario(SMALL);
+    bench.run("run s.toml --no-pictures --quiet");
+    let results = bench.path("out/small");
+    assert!(results.is_dir());
+    let unfinished = results.join(".needlebench-Ab12Cd.tmp");
+    std::fs::write(&unfinished, "half").unwrap();
+    let folder = File::open(&results).unwrap();
+    folder.lock().unwrap();
+    let written = results.join("report.json").metadata().unwrap().modified();
+    for arguments in [
+        "run s.toml --no-pictures --quiet",
+        "ct synth s.toml --out out/small",
+    ] {
+        let answer = bench.run(arguments).exits_with(3);
+        answer.complains(["another process is writing here", "hint: wait for it"]);
+    }
+    let now = results.join("report.json").metadata().unwrap().modified();
+    assert_eq!(written.unwrap(), now.unwrap());
+    assert!(unfinished.exists());
+    drop(folder);
+    bench.run("run s.toml --no-pictures --quiet");
+    assert!(!unfinished.exists());
+}

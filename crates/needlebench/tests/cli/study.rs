@@ -139,7 +139,10 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
         .run_with(&[("COLUMNS", Some("80"))], arguments)
         .exits_with(0);
     let lines: Vec<&str> = answer.stdout.lines().collect();
-    assert_eq!(lines[0], "moved, 96 cases: PASS: 1 of 1 criteria met");
+    assert_eq!(
+        lines[0],
+        "moved, 96 cases (postures only): PASS: 1 of 1 criteria met"
+    );
     assert!(
         lines[1].starts_with("ANSWER: best height of 3: "),
         "{}",
