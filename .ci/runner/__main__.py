@@ -36,6 +36,9 @@ SIDE_BY_SIDE = 2
 FIGURE = re.compile(r"^figure ([\w.]+) (\S+)$", re.MULTILINE)
 MARK = re.compile(r"^mark ([\w.-]+) (\S+)$", re.MULTILINE)
 WORSE = 1.1
+# Exit status of a check that could not ask what it is to ask, as a database that cannot be reached. It did not fail and
+# it did not pass; with NEEDLEBENCH_CI_COMPLETE=1 that is a failure.
+NOT_JUDGED = 75
 
 
 def say(*words: str) -> None:
@@ -48,6 +51,7 @@ class Outcome:
 
     name: str
     failure: str = ""
+    not_judged: str = ""
     seconds: float = 0.0
     cpu_seconds: float = 0.0
 
@@ -116,7 +120,11 @@ class Run:
             _, status, used = os.wait4(child.pid, 0)
         child.returncode = status = os.waitstatus_to_exitcode(status)
         failure = f"exit status {status}" if status else ""
-        return Outcome(name, failure, time.monotonic() - start, used.ru_utime + used.ru_stime)
+        outcome = Outcome(name, failure, seconds=time.monotonic() - start, cpu_seconds=used.ru_utime + used.ru_stime)
+        if status == NOT_JUDGED and check is not None and not os.environ.get("NEEDLEBENCH_CI_COMPLETE"):
+            lines = log.read_text(errors="replace").splitlines()
+            outcome.failure, outcome.not_judged = "", lines[-1] if lines else "it says nothing"
+        return outcome
 
     def traces(self, check: Check) -> bool:
         return self.tracing and check.tier == "evidence" and not check.untraced
@@ -128,14 +136,16 @@ class Run:
         except MistakeError as error:
             failure = str(error)
         outcome = Outcome(check.name, failure) if failure else self.command(check.name, check.run, check)
-        if not outcome.failure:
+        if not outcome.failure and not outcome.not_judged:
             try:
                 self.accept(check, outcome)
             except MistakeError as error:
                 outcome.failure = str(error)
-        word = "FAILED" if outcome.failure else "passed"
+        word = "FAILED" if outcome.failure else "NOT JUDGED" if outcome.not_judged else "passed"
         at = f"{time.monotonic() - self.began:.0f} s"
         say(f"{word} {check.name:<22} {outcome.seconds:7.1f} s  (at {at})  {check.title}")
+        if outcome.not_judged:
+            say(f"    {outcome.not_judged}")
         if outcome.failure:
             self.explain(check, outcome)
         return outcome
@@ -330,7 +340,11 @@ def summary(run: Run, passed: bool) -> int:
     if not passed:
         say(f"FAILED: {', '.join(failed)}; to see them alone: .ci/run {' '.join(failed)}")
         return 1
-    say(f"all {len(run.outcomes)} checks passed in {time.monotonic() - run.began:.0f} s")
+    not_judged = [each.name for each in run.outcomes if each.not_judged]
+    if not_judged:
+        say(f"NOT JUDGED: {', '.join(not_judged)}")
+    count = len(run.outcomes) - len(not_judged)
+    say(f"all {count} checks that were judged passed in {time.monotonic() - run.began:.0f} s")
     if any(checks.checks()[each.name].tier == "evidence" for each in run.outcomes):
         say("new records are in .ci/evidence.lock: commit it with the change")
     return 0

@@ -13,8 +13,8 @@ from pathlib import Path
 from . import checks, tree
 from .tree import TOP
 
-# As a wheel, where it is not installed. It makes in seconds what pip makes in minutes.
-UV = "uv==0.13.9"
+# uv as a wheel, where it is not installed. It makes in seconds what pip makes in minutes.
+INSTALLER = TOP / ".ci/installer-requirements.txt"
 
 
 def root() -> Path:
@@ -32,7 +32,7 @@ def uv() -> str | None:
     own = root() / "uv"
     if not (own / "bin/uv").exists():
         made = subprocess.run([sys.executable, "-m", "venv", own], capture_output=True, check=False).returncode == 0
-        command = [own / "bin/pip", "install", "--quiet", "--disable-pip-version-check", UV]
+        command = [own / "bin/pip", "install", "--quiet", "--disable-pip-version-check", *exactly(INSTALLER)]
         if not made or subprocess.run(command, capture_output=True, check=False).returncode:
             shutil.rmtree(own, ignore_errors=True)
             return None
@@ -56,11 +56,16 @@ def prepared(name: str) -> Path:
     else:
         run(sys.executable, "-m", "venv", str(folder))
         command = [str(folder / "bin/pip"), "install", "--quiet", "--disable-pip-version-check"]
-    run(*command, "--requirement", str(requirements))
+    run(*command, *exactly(requirements))
     with tempfile.NamedTemporaryFile("w", dir=folder, delete=False) as partial:
         partial.write(wanted)
     Path(partial.name).replace(stamp)
     return folder
+
+
+def exactly(requirements: Path) -> list[str]:
+    """Options for what a file names, with its hashes, and nothing else."""
+    return ["--require-hashes", "--requirement", str(requirements)]
 
 
 def found_by_pip() -> list[str]:
