@@ -274,6 +274,7 @@ mod tests {
         assert!(!file.exists());
 
         fs::write(&file, "sealed").unwrap();
+        fs::remove_file(cache.path().join(SEAL)).unwrap();
         seal(cache.path(), "key").unwrap();
         assert_eq!(look(cache.path(), "key"), Found::Complete);
         assert!(file.exists());
