@@ -15,8 +15,8 @@ use needlebench_kinematics::ik::{
     closed_form_into, gauss_newton,
 };
 use needlebench_kinematics::pose_sets::PoseSet;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
+use needlebench_numerics::random::SplitMix64;
 
 fn inverse(c: &mut Criterion) {
     let q =

@@ -197,7 +197,7 @@ mod tests {
     use super::*;
     use crate::UrGeometry;
     use crate::pose_sets::PoseSet;
-    use crate::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     /// Step of the central differences, rad: the cube root of the rounding of a double.
     const STEP_RAD: f64 = 6e-6;

@@ -216,8 +216,8 @@ mod tests {
     use nalgebra::{Rotation3, SVector};
 
     use super::*;
-    use crate::random::SplitMix64;
     use crate::{Body, UrGeometry, integrate};
+    use needlebench_numerics::random::SplitMix64;
 
     /// Ten times the worst that is seen over the states below, without armature.
     const INVERSE: f64 = 1e-11;
@@ -328,7 +328,7 @@ mod tests {
         }
     }
 
-    /// The figure for the referee is 1e-9 over 10 s.
+    /// Required of the reference integrator: a relative imbalance below 1e-9 over 10 s.
     const BALANCE: f64 = 1e-9;
 
     /// Joint state, work of the torques, and impulse of everything that acts on the arm.

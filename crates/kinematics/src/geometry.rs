@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use needlebench_numerics::random::SplitMix64;
 
-use crate::random::SplitMix64;
 use crate::{Chain, ChainJoint, Joints, Pose, rotation_angle_between};
 
 /// Standard Denavit-Hartenberg lengths of a UR arm, m.

@@ -14,10 +14,10 @@ const SAFETY: f64 = 0.9;
 const LEAST_FACTOR: f64 = 0.2;
 const MOST_FACTOR: f64 = 5.0;
 
-/// The tolerance could not be kept: the solution is not smooth, or it is not finite.
+/// The tolerance could not be satisfied: the solution is not smooth, or not finite.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "no step keeps the tolerance of {tolerance:e} {elapsed_s} s into an interval of {interval_s} s"
+    "no step satisfies the tolerance of {tolerance:e} at {elapsed_s} s of an interval of {interval_s} s"
 )]
 pub struct NotSmooth {
     /// Allowed error per step.

@@ -2,9 +2,6 @@
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod chain;
-// Numerics that the testbench shares, hidden from the documentation: no part of what this crate promises.
-#[doc(hidden)]
-pub mod chi_square;
 mod dynamics;
 mod forward_dynamics;
 mod geometry;
@@ -13,12 +10,9 @@ mod integrate;
 mod limits;
 mod manipulability;
 mod models;
-#[doc(hidden)]
-pub mod normal;
+// Of tests and benches, hidden from the documentation: no part of what this crate promises.
 #[doc(hidden)]
 pub mod pose_sets;
-#[doc(hidden)]
-pub mod random;
 pub mod registration;
 mod rotation;
 pub mod trajectory;

@@ -1,4 +1,4 @@
-//! Joint limits: positions, speeds, torques; and what the arms' makers and users set them to.
+//! Joint limits: positions, speeds, torques; and the usual values of manufacturers and users.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
@@ -11,7 +11,7 @@ use crate::{JOINT_COUNT, Joints, UrModel};
 /// moving it that far onto the limit moves the flange by less than 1.5e-14 m per metre of reach.
 pub const LIMIT_ROUNDING_RAD: f64 = 1e-14;
 
-/// Most whole turns ever added to a position. Beyond it a double holds the angle to no better than
+/// Most full revolutions ever added to a position. Beyond it a double holds the angle to no better than
 /// 1e-9 rad.
 pub const MAX_TURNS: i32 = 1_000_000;
 
@@ -41,8 +41,8 @@ impl JointLimit {
         inside.then(|| position_rad.max(self.lower_rad).min(self.upper_rad))
     }
 
-    /// Whole turns that [`JointLimit::admit`] lets be added to a position, at most [`MAX_TURNS`]
-    /// each way. `None` if there are none, and for a position that is not finite.
+    /// Numbers of full revolutions that give a 2π equivalent of a position which [`JointLimit::admit`] accepts, at
+    /// most [`MAX_TURNS`] each way. `None` if there are none, and for a position that is not finite.
     pub fn turns(&self, position_rad: f64) -> Option<RangeInclusive<i32>> {
         if !position_rad.is_finite() || self.lower_rad.is_nan() || self.upper_rad.is_nan() {
             return None;
@@ -62,7 +62,7 @@ impl JointLimit {
     }
 }
 
-/// A position with whole turns added, rad.
+/// A position with full revolutions added, rad.
 pub(crate) fn turned(position_rad: f64, turns: i32) -> f64 {
     position_rad + TAU * f64::from(turns)
 }
@@ -117,7 +117,7 @@ impl JointLimits {
 
 /// How far every joint may turn either way from zero: a policy, not a property of the arm alone.
 ///
-/// The maker lets every joint turn by 360 degrees either way, and wrist 3 of the UR3 and the UR3e
+/// The manufacturer lets every joint turn by 360 degrees either way, and wrist 3 of the UR3 and the UR3e
 /// without end (user manuals UR3/CB3 3.13 and UR3e 5.8). ROS halves the range of the elbow, which
 /// the arm's own shoulder stops near 180 degrees anyway (`config/*/joint_limits.yaml` of
 /// `ur_description`), so that planners do not fall between two unconnected halves.

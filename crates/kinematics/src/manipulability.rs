@@ -170,7 +170,7 @@ mod tests {
     use super::*;
     use crate::UrModel;
     use crate::pose_sets::PoseSet;
-    use crate::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     /// Twenty times the rounding of a determinant below 0.03 m^3 from entries of about 1.
     const DETERMINANT_M3: f64 = 1e-15;

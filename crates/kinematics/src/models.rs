@@ -39,7 +39,7 @@ impl UrModel {
         Self::Ur16e,
     ];
 
-    /// The maker's name: `UR3e`.
+    /// The manufacturer's name of the model: `UR3e`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ur3 => "UR3",
@@ -114,7 +114,7 @@ impl fmt::Display for UrModel {
 
 /// A name that is none of [`UrModel::ALL`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{name}` is not an arm known here; known: {}", UrModel::ALL.map(UrModel::name).join(", "))]
+#[error("unknown arm `{name}`; known: {}", UrModel::ALL.map(UrModel::name).join(", "))]
 pub struct UnknownUrModel {
     /// The name as given.
     pub name: String,

@@ -5,8 +5,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::random::SplitMix64;
 use crate::{Joints, Pose, UrGeometry};
+use needlebench_numerics::random::SplitMix64;
 
 /// A set of postures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -48,14 +48,14 @@ pub enum RegistrationError {
         count: usize,
     },
     /// Sets of different size.
-    #[error("{from} fiducials cannot be matched to {to}: each needs its counterpart")]
+    #[error("{from} fiducials cannot be matched to {to}: each requires a counterpart")]
     Unmatched {
         /// Points of the first set.
         from: usize,
         /// Points of the second set.
         to: usize,
     },
-    /// A coordinate that is no number, or too far away to be measured.
+    /// A coordinate that is not a number, or too large.
     #[error("coordinate {axis} of fiducial {index} is {value}")]
     BadCoordinate {
         /// Which point, from 0.
@@ -82,28 +82,26 @@ pub enum RegistrationError {
          images or not in the same order"
     )]
     Ambiguous,
-    /// A localisation error that is negative or no number.
-    #[error(
-        "the fiducial localisation error is {fle_rms_m} m; it has to be finite and not negative"
-    )]
+    /// A localisation error that is negative or not a number.
+    #[error("the fiducial localisation error is {fle_rms_m} m; it must be finite and non-negative")]
     BadLocalisationError {
         /// The error, m.
         fle_rms_m: f64,
     },
-    /// A covariance that is none, or that says that a pair of points has no error.
+    /// An invalid covariance, or a pair of points without any error.
     #[error(
-        "the covariances of fiducial {index} have to be finite, symmetric and not negative, and together \
-         positive in every direction"
+        "the covariances of fiducial {index} must be finite, symmetric and positive semidefinite, and their sum \
+         positive definite"
     )]
     BadCovariance {
         /// Which pair, from 0.
         index: usize,
     },
-    /// Covariances so wide that a shift or a turn is not determined.
-    #[error("the covariances are so wide in one direction that they leave the transform open")]
+    /// Covariances so large that a translation or a rotation is not determined.
+    #[error("the covariances are so large in one direction that the transform is not determined")]
     Undetermined,
-    /// A weighted fit that goes on moving.
-    #[error("the weighted fit does not settle; the points are probably not in the same order")]
+    /// A weighted fit that does not converge.
+    #[error("the weighted fit does not converge; the points are probably not in the same order")]
     NotSettled,
 }
 

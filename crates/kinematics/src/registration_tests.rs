@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
+use needlebench_numerics::random::SplitMix64;
 
 use super::*;
-use crate::random::SplitMix64;
 use crate::rotation_angle_between;
 
 /// Rounding of some hundred operations on coordinates below 1 m.

@@ -12,12 +12,12 @@ use nalgebra::UnitQuaternion;
 use crate::geometry::{Mismatch, base_from_base_link};
 use crate::{Chain, JointLimits, Joints, NotUrGeometry, Pose, UrGeometry};
 
-/// What a row is.
+/// Kind of a solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SolutionKind {
     /// Reproduces the pose.
     Exact,
-    /// Misses the pose by no more than the tolerance.
+    /// Reproduces the pose within the tolerance.
     Touching,
     /// The nearest posture that the solver found; the residuals say how far off.
     Nearest,
@@ -30,18 +30,18 @@ pub struct Solution {
     pub configuration: Configuration,
     /// Joint positions, rad, each in `[-pi, pi]`.
     pub joints: Joints,
-    /// Distance of the flange from the wanted position, by forward kinematics, m.
+    /// Distance of the flange from the requested position, by forward kinematics, m.
     pub residual_m: f64,
-    /// Angle of the flange from the wanted orientation, by forward kinematics, rad.
+    /// Angle of the flange from the requested orientation, by forward kinematics, rad.
     pub residual_rad: f64,
     /// Exact or only nearest.
     pub kind: SolutionKind,
     /// Wrist 3 is free: this is one member of a family (`q5` is 0 or pi).
     pub wrist_3_is_free: bool,
-    /// A root was zero: another configuration is the same posture and has no row of its own.
+    /// Coincident: a root was zero, and another configuration is the same posture without a separate solution.
     pub merged: bool,
-    /// The pose as its numbers stand misses this row: it exists within their rounding, or within the
-    /// tolerance, only. The residuals say by how much.
+    /// Boundary solution: it exists only within the rounding of the pose, or within the tolerance. The
+    /// residuals give the distance.
     pub touching: bool,
 }
 
@@ -56,7 +56,7 @@ pub struct Solutions {
     pub nearest: Vec<Solution>,
     /// Configurations that do not reach the pose, with the reason.
     pub unreachable: Vec<(Configuration, Unreachable)>,
-    /// What the answer is worth.
+    /// The certificate of the answer.
     pub certificate: Certificate,
 }
 
@@ -90,8 +90,8 @@ impl Kinematics {
         })
     }
 
-    /// The same with another tolerance: a branch that the pose misses by no more has a row, flagged
-    /// as touching. Without, it is [`Tolerance::default`].
+    /// The same with another tolerance of boundary solutions, which are flagged as touching. The default
+    /// is [`Tolerance::default`].
     pub fn touching_within(self, tolerance: Tolerance) -> Self {
         Self { tolerance, ..self }
     }
@@ -113,9 +113,9 @@ impl Kinematics {
     ///
     /// A nominal chain is solved by the closed form. A calibrated one has every branch of the
     /// nominal arm refined, with a sweep of every shoulder that is next to a singularity; near
-    /// singularities it may have more than one row of a name. Of postures of nine real calibrations,
+    /// singularities it may have more than one solution of a name. Of postures of nine real calibrations,
     /// random and near each singularity, at least 99.9 % are found again
-    /// (`the_posture_that_made_the_pose_is_found`). Residual of every row at most 1e-12 m and rad
+    /// (`the_posture_that_made_the_pose_is_found`). Residual of every solution at most 1e-12 m and rad
     /// (`every_solution_reproduces_the_pose`).
     pub fn solve(&self, base_link_from_flange: &Pose, seed: Option<&Joints>) -> Solutions {
         let mut answer = self.branches(base_link_from_flange, seed);
@@ -180,7 +180,7 @@ impl Kinematics {
         }
     }
 
-    /// One configuration of [`Kinematics::branches`], with the same bits; none if it has no row there. On
+    /// One configuration of [`Kinematics::branches`], with the same bits; none if it has no solution there. On
     /// a nominal chain the others are not refined.
     pub fn branch(
         &self,
@@ -213,10 +213,10 @@ impl Kinematics {
         }
     }
 
-    /// All rows of a pose in `base_link`, into a place that exists: [`Kinematics::branches`] without
+    /// All solutions of a pose in `base_link`, into existing memory: [`Kinematics::branches`] without
     /// residuals and reasons.
     ///
-    /// On a nominal chain nothing is allocated, and rows are as the closed form gives them: a chain
+    /// On a nominal chain nothing is allocated, and solutions are as the closed form gives them: a chain
     /// whose file prints its angles to ten digits is off by up to 1e-8, which
     /// [`Kinematics::branches`] takes off.
     pub fn rows_into(&self, base_link_from_flange: &Pose, seed: Option<&Joints>, out: &mut Rows) {
@@ -480,7 +480,7 @@ impl Kinematics {
     }
 }
 
-/// Rows of a pose, to be filled again and again.
+/// The solutions of a pose, in reusable memory.
 #[derive(Debug, Clone)]
 pub struct Rows {
     closed: ClosedForm,
@@ -506,7 +506,7 @@ impl Rows {
         closed.into_iter().flatten().chain(refined)
     }
 
-    /// How many there are.
+    /// Number of solutions.
     pub fn count(&self) -> usize {
         if self.is_closed {
             self.closed.count() as usize
@@ -515,7 +515,7 @@ impl Rows {
         }
     }
 
-    /// What the answer is worth.
+    /// The certificate of the answer.
     pub fn certificate(&self) -> Certificate {
         if self.is_closed {
             self.closed.certificate()

@@ -239,7 +239,7 @@ fn single_precision(pose: &Pose) -> Pose {
 
 #[test]
 fn every_branch_of_the_closed_form_is_a_branch_of_the_arm() {
-    let (arm, mut random) = (ur3(), crate::random::SplitMix64::new(5));
+    let (arm, mut random) = (ur3(), needlebench_numerics::random::SplitMix64::new(5));
     let turn = crate::geometry::base_from_base_link();
     let mut lost = Vec::new();
     for index in 0..12_000 {

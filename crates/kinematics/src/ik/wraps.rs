@@ -1,9 +1,9 @@
-//! Whole turns of a posture within joint limits, nearest to a seed first.
+//! 2π equivalents (wraps) of a posture within joint limits, nearest to a seed first.
 //!
-//! Adding whole turns to joints moves no link, so that one row of the closed form is up to 64
-//! postures of an arm whose joints turn by 360 degrees either way, eight rows are 512, and there is
-//! no end of them where wrist 3 turns without end. They are found one by one in the order of their
-//! distance, so that whoever needs the nearest pays for the nearest.
+//! A full revolution of a joint moves no link. So one solution of the closed form has up to 64 2π equivalents
+//! on an arm whose joints turn by 360 degrees either way, eight solutions have 512, and there are infinitely
+//! many where wrist 3 is unlimited. They are found one by one in the order of their distance, so that the
+//! nearest one is found without the others.
 //!
 //! Every joint has its ladder: the admitted numbers of turns, nearest to the seed first. A node is
 //! a rung on each of the six ladders, and its children are one rung further on one ladder, which
@@ -17,12 +17,12 @@ use std::f64::consts::TAU;
 use crate::limits::{nearest_whole, turned};
 use crate::{JOINT_COUNT, JointLimits, Joints};
 
-/// A posture with whole turns added.
+/// A 2π equivalent of a posture: full revolutions added to its joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wrap {
     /// Which of the given postures it is, counted from zero.
     pub posture: usize,
-    /// Joint positions, rad, within the limits: the given ones plus whole turns, up to
+    /// Joint positions, rad, within the limits: the given ones plus full revolutions, up to
     /// [`LIMIT_ROUNDING_RAD`](crate::LIMIT_ROUNDING_RAD) at a limit.
     pub joints: Joints,
     /// Turns added to every joint.

@@ -2,11 +2,11 @@
 
 use std::f64::consts::{PI, TAU};
 
+use needlebench_numerics::random::SplitMix64;
 use proptest::prelude::*;
 
 use super::{Wrap, WrapOrder, WrapSearch, closed_form, nearest_within_limits};
 use crate::pose_sets::PoseSet;
-use crate::random::SplitMix64;
 use crate::{JOINT_COUNT, JointLimits, Joints, LimitPolicy, UrGeometry, UrModel};
 
 fn limits(policy: LimitPolicy) -> JointLimits {

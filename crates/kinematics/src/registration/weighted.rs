@@ -33,7 +33,7 @@ impl Localised {
     }
 }
 
-/// What a fit leaves of a pair of points, or what a fit to the others misses it by.
+/// Residual of a fit at a pair of points, or of a fit to the other pairs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
     /// `fitted * from - to`, m.
@@ -123,7 +123,7 @@ pub fn register_weighted(
     Err(RegistrationError::NotSettled)
 }
 
-/// What the fit to all other pairs misses each pair by; `None` where the others do not determine a transform.
+/// Residual at each pair of the fit to all other pairs; `None` where the others do not determine a transform.
 ///
 /// The error's covariance is that of the prediction and of the pair itself: a pair whose chi-square is far above three
 /// is not where the others say.
@@ -141,7 +141,7 @@ pub fn leave_one_out(from: &[Localised], to: &[Localised]) -> Vec<Option<Residua
         .collect()
 }
 
-/// By how much a fit misses a pair that was not part of it.
+/// Residual of a fit at a pair that was not part of it.
 pub fn prediction(fit: &WeightedFit, from: &Localised, to: &Localised) -> Option<Residual> {
     let error_m = fit.to_from_from * from.at_m - to.at_m;
     let covariance_m2 = combined(&fit.to_from_from, from, to) + fit.tre_covariance(&from.at_m);

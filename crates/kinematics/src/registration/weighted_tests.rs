@@ -1,10 +1,10 @@
 //! The weighted fit against the unweighted one, against Fitzpatrick and West, and its covariance against simulation.
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
+use needlebench_numerics::random::NormalPairs;
 
 use super::super::{expected_tre_rms_m, tre_covariance};
 use super::*;
-use crate::random::NormalPairs;
 
 /// Rounding of some rounds on coordinates below 1 m.
 const ROUNDING: f64 = 1e-13;

@@ -1,4 +1,4 @@
-//! Joint trajectories: straight joint motions, straight tool lines, holds.
+//! Joint trajectories: joint-space lines, straight tool lines, holds.
 //!
 //! Every planned segment starts and ends at rest and follows a seven-phase (double-S) profile, so
 //! position, velocity and acceleration are continuous and the jerk is bounded. What was recorded
@@ -72,7 +72,7 @@ pub enum Phase {
     Retract,
     /// From there back to the start posture.
     Return,
-    /// Into a contact that was asked for.
+    /// Into a prescribed contact.
     Press,
     /// Back out of it.
     Release,
@@ -145,7 +145,7 @@ impl JointTrajectory {
         }
     }
 
-    /// Appends the straight joint motion to `to`, all joints synchronised.
+    /// Appends the joint-space line to `to`, all joints synchronised.
     #[must_use]
     pub fn then_straight_to(mut self, phase: Phase, to: Joints, limits: &MotionLimits) -> Self {
         let from = self.end;

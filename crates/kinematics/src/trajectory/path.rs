@@ -58,7 +58,7 @@ impl JointPath {
         self.knots[self.knots.len() - 1].position
     }
 
-    /// The same path with whole turns added to joints.
+    /// The same path with an offset added to the joints, rad: full revolutions give a 2π equivalent.
     pub fn shifted(&self, shift: &Joints) -> Self {
         let mut path = self.clone();
         for knot in &mut path.knots {

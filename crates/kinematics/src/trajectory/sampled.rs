@@ -12,22 +12,22 @@ pub(super) struct Sampled {
     states: Vec<JointState>,
 }
 
-/// Why set-points are no trajectory.
+/// Why set-points are not a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NotSampled {
-    /// A course has a start and an end.
+    /// Fewer than two set-points.
     #[error("a trajectory needs two set-points")]
     TooFew,
-    /// Every set-point has a time.
-    #[error("there are not as many times as set-points")]
+    /// A different number of times and set-points.
+    #[error("the numbers of times and set-points differ")]
     Uneven,
-    /// Time goes on.
-    #[error("set-point {index} is not after the one before it")]
+    /// Times that do not increase.
+    #[error("the time of set-point {index} is not after that of the one before it")]
     NotIncreasing {
         /// Index of the later one.
         index: usize,
     },
-    /// No number can be followed.
+    /// A set-point that is not finite.
     #[error("set-point {index} is not finite")]
     NotFinite {
         /// Index of the set-point.

@@ -74,7 +74,7 @@ fn duration(way: &Joints, speed: &Joints) -> f64 {
 mod tests {
     use super::super::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
     use super::*;
-    use crate::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     /// Between two of the samples at which limits are compared a joint may exceed its own by this
     /// much, relatively.

@@ -210,8 +210,8 @@ mod tests {
 
     use super::super::{MotionLimits, Phase, ProfileLimits};
     use super::*;
-    use crate::random::SplitMix64;
     use crate::{JOINT_COUNT, UrGeometry};
+    use needlebench_numerics::random::SplitMix64;
 
     /// A bound may be this much longer than the way, relatively: what is left of the coefficients'
     /// polygon around a turning point.

@@ -12,7 +12,7 @@ use ik_geo::inverse_kinematics::three_parallel_two_intersecting;
 use nalgebra_032 as older;
 use needlebench_kinematics::ik::{ClosedForm, Preference, closed_form_batch, closed_form_into};
 use needlebench_kinematics::pose_sets::{PoseSet, rounded_to_f32};
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use needlebench_kinematics::{
     Joints, Pose, UrGeometry, base_from_base_link, rotation_angle_between,
 };

@@ -275,7 +275,7 @@ impl Calibrated<'_> {
     }
 }
 
-/// Greatest difference of two postures in any joint, whole turns aside, rad.
+/// Greatest difference of two postures in any joint, rad; 2π equivalents differ by 0.
 fn apart(a: &Joints, b: &Joints) -> f64 {
     (a - b).map(|d| wrap_angle(d).abs()).max()
 }

@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
+use needlebench_numerics::random::SplitMix64;
 
 use super::super::numerical::pose_error;
 use super::super::*;
 use crate::pose_sets::PoseSet;
-use crate::random::SplitMix64;
 use crate::{Chain, Joints, Pose, UrGeometry};
 
 /// Share of branches that must be found; 99.93 % were over 9 calibrations and 9000 poses.

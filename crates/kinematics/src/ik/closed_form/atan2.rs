@@ -63,7 +63,7 @@ mod tests {
     use fearless_simd::{Level, dispatch, f64x4};
 
     use super::*;
-    use crate::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     /// Stated in the documentation of `atan2`; the worst seen over 1e6 angles is 4.5e-16.
     const ERROR_RAD: f64 = 4.7e-16;

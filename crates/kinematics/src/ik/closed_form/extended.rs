@@ -143,7 +143,7 @@ impl Div for Extended {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     /// The bound of the cited paper's weakest operation.
     const RELATIVE: f64 = 1.3e-31;

@@ -136,8 +136,8 @@ impl FreeWrist {
         )
     }
 
-    /// The value of `q6` nearest to `wanted_rad` whose member is inside joint limits, whole turns
-    /// allowed. Found on a grid of one degree, then bisected.
+    /// The value of `q6` nearest to `wanted_rad` whose member, or a 2π equivalent of it, is inside the joint limits.
+    /// Found on a grid of one degree, then bisected.
     pub fn nearest_q6_within(
         &self,
         elbow: Elbow,

@@ -36,14 +36,13 @@ pub struct ClosedFormSolution {
     /// Wrist 3 may take other values: at `q5 = 0` or `pi` only `q6` plus or minus `q2 + q3 + q4`
     /// is determined, and this is one member of a family ([`ClosedForm::free_wrist`]).
     pub wrist_3_is_free: bool,
-    /// Another configuration is the same posture within rounding and has no row of its own.
+    /// Coincident: another configuration is the same posture within rounding, without a separate solution.
     pub merged: bool,
-    /// The pose as its numbers stand misses this row: it exists within their rounding, or within the
-    /// tolerance that was given, only.
+    /// Boundary solution: it exists only within the rounding of the pose, or within the given tolerance.
     pub touching: bool,
 }
 
-/// By how much a row may miss the pose and still be one, flagged as touching.
+/// Tolerance of boundary solutions, which are flagged as touching.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     /// Of the position, m.
@@ -64,7 +63,7 @@ impl Default for Tolerance {
     }
 }
 
-/// Why a configuration does not exist at a pose.
+/// Why a configuration has no solution at a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Unreachable {
     /// The wrist centre is nearer to the shoulder axis than `d4`.
@@ -82,7 +81,7 @@ pub enum Unreachable {
         /// By how much, m.
         missing_m: f64,
     },
-    /// The nominal arm reaches the pose, the calibrated one comes only so near.
+    /// The nominal arm reaches the pose, the calibrated one does not.
     NoCounterpart {
         /// Position error left, m.
         missing_m: f64,
@@ -114,40 +113,39 @@ impl Unreachable {
     }
 }
 
-/// What an answer of the closed form is worth. Its number, from 0 in this order, is that in memory.
+/// Certificate of an answer of the closed form. Its number, from 0 in this order, is that in memory.
 ///
 /// The pose is what its doubles say, exactly. Its branches depend on three signs, of
-/// `rho^2 - d4^2`, `s5^2` and `1 -+ cos q3`, and on nothing else. A row that these signs deny, and
-/// that exists within rounding or a tolerance only, says so itself
-/// ([`ClosedFormSolution::touching`]).
+/// `rho^2 - d4^2`, `s5^2` and `1 -+ cos q3`, and on nothing else. A boundary solution, which exists only
+/// within rounding or a tolerance, is flagged ([`ClosedFormSolution::touching`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, NoUninit, CheckedBitPattern)]
 #[repr(u8)]
 pub enum Certificate {
     /// Every sign was beyond the error bound of double precision: no branch is missing, and none but
-    /// touching ones is too many.
+    /// boundary solutions is superfluous.
     Complete,
     /// As [`Certificate::Complete`], but a sign needed extended precision.
     DecidedInExtendedPrecision,
-    /// Two or more configurations are one posture within the rounding of the pose, and have one
-    /// row; every other branch has its own.
+    /// Two or more configurations coincide within the rounding of the pose, and have one solution;
+    /// every other branch has its own.
     MergedBranches,
-    /// Wrist 3 is free within the rounding of the pose: a row stands for a family.
+    /// Wrist 3 is free within the rounding of the pose: a solution represents a family.
     FreeJoint,
-    /// Rows of a calibrated chain, refined numerically from the nominal arm's: each is a solution,
-    /// but that none is missing is only measured, not certain ([`super::Kinematics::solve`]).
+    /// Solutions of a calibrated chain, refined numerically from the nominal arm's: each is valid, but
+    /// completeness is only measured, not certain ([`super::Kinematics::solve`]).
     Refined,
     /// No configuration reaches the pose; there is only a nearest posture.
     NearestOnly,
-    /// The numbers are no pose: see [`ClosedForm::unreachable`].
+    /// The numbers are not a pose: see [`ClosedForm::unreachable`].
     NotAPose,
 }
 
 /// What decides between the members of a family.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Preference<'a> {
-    /// Joint positions to be near to, rad; zeros if left out.
+    /// Joint positions to be close to, rad [default: zeros].
     pub seed: Option<&'a Joints>,
-    /// Limits to keep, whole turns allowed.
+    /// Joint limits; one 2π equivalent within them is enough.
     pub limits: Option<&'a JointLimits>,
 }
 
@@ -181,12 +179,12 @@ impl ClosedForm {
         rest: [0; 3],
     };
 
-    /// What the answer is worth.
+    /// The certificate of the answer.
     pub fn certificate(&self) -> Certificate {
         self.certificate
     }
 
-    /// Number of rows.
+    /// Number of solutions.
     pub fn count(&self) -> u32 {
         self.exists.count_ones()
     }
@@ -212,7 +210,7 @@ impl ClosedForm {
     }
 
     /// Configurations that do not reach the pose, and why, in the order of [`Configuration::ALL`].
-    /// Those that are the same posture as one with a row are not among them. `geometry` and
+    /// Coincident ones are not among them. `geometry` and
     /// `base_from_flange` are those that were solved.
     pub fn unreachable(
         &self,
@@ -232,7 +230,7 @@ impl ClosedForm {
             })
     }
 
-    /// The family that the rows of a shoulder with a free wrist 3 stand for. `geometry` and
+    /// The family that the solutions of a shoulder with a free wrist 3 represent. `geometry` and
     /// `base_from_flange` are those that were solved.
     pub fn free_wrist(
         &self,
@@ -279,7 +277,7 @@ pub fn closed_form(
     out
 }
 
-/// [`closed_form`] into a place that exists, with joint limits for the members of a family.
+/// [`closed_form`] into existing memory, with joint limits for the members of a family.
 #[inline]
 pub fn closed_form_into(
     geometry: &UrGeometry,
@@ -296,8 +294,8 @@ pub fn closed_form_into(
     );
 }
 
-/// [`closed_form_into`] with touching rows for branches that the pose misses by no more than a
-/// tolerance: that of a pose in few digits, or in single precision.
+/// [`closed_form_into`] with boundary solutions within a tolerance: that of a pose in few digits, or in
+/// single precision.
 #[inline]
 pub fn closed_form_within(
     geometry: &UrGeometry,

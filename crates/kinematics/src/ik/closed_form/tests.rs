@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
+use needlebench_numerics::random::SplitMix64;
 
 use super::super::{Elbow, wrap_angle};
 use super::*;
 use crate::pose_sets::{PoseSet, rounded_to_f32};
-use crate::random::SplitMix64;
 use crate::{JointLimit, rotation_angle_between};
 
 const UR3: UrGeometry = UrGeometry::UR3;

@@ -385,8 +385,8 @@ mod tests {
 
     use super::*;
     use crate::pose_sets::PoseSet;
-    use crate::random::SplitMix64;
     use crate::{UrGeometry, rotation_vector};
+    use needlebench_numerics::random::SplitMix64;
 
     /// One unit in the last place of one; the worst over 1e6 angles is 1.2e-16.
     const SINE: f64 = 2.3e-16;

@@ -14,9 +14,9 @@ use std::time::{Duration, Instant};
 
 use fearless_simd::prelude::*;
 use nalgebra::{Matrix6, Vector6};
+use needlebench_numerics::random::SplitMix64;
 
 use crate::chain::stacked;
-use crate::random::SplitMix64;
 use crate::{Chain, JOINT_COUNT, Joints, Pose, rotation_vector};
 use descent::{End, Steering, descend, least_squares};
 use fold::{flattest_plane, fold};
@@ -94,7 +94,7 @@ impl Default for DampedOptions {
 pub enum Stop {
     /// Both residuals are within the tolerance.
     Converged,
-    /// A least-squares minimum that is no solution.
+    /// A least-squares minimum that is not a solution.
     Stationary,
     /// As many steps as allowed.
     IterationLimit,
@@ -114,9 +114,9 @@ pub struct NumericalResult {
     pub iterations: u32,
     /// Starts given up.
     pub restarts: u32,
-    /// Distance to the wanted position, m.
+    /// Distance to the requested position, m.
     pub residual_m: f64,
-    /// Angle to the wanted orientation, rad.
+    /// Angle to the requested orientation, rad.
     pub residual_rad: f64,
     /// Both residuals are within the tolerance.
     pub converged: bool,

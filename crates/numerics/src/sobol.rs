@@ -5,10 +5,10 @@
 //! (Gray code). Scrambling: Owen, "Randomly permuted (t,m,s)-nets and (t,s)-sequences", 1995: each bit is
 //! flipped or not by a hash of the bits above it, so every prefix of 2^k points keeps its balance.
 
-use needlebench_kinematics::random::SplitMix64;
+use crate::random::SplitMix64;
 
 /// Number of dimensions that the table goes to.
-pub(crate) const DIMENSIONS: usize = 40;
+pub const DIMENSIONS: usize = 40;
 
 /// Primitive polynomials with their leading and trailing coefficient, and initial direction numbers,
 /// from the second dimension on.
@@ -59,7 +59,7 @@ const BITS: usize = 32;
 
 /// One dimension of the sequence.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct SobolDimension {
+pub struct SobolDimension {
     directions: [u32; BITS],
     scramble_seed: u64,
 }

@@ -75,7 +75,7 @@ fn continued_fraction(a: f64, b: f64, x: f64) -> f64 {
 
 /// The value that the beta distribution of two positive numbers is below with a probability: by
 /// halving, to the last bits.
-pub(super) fn beta_quantile(a: f64, b: f64, probability: f64) -> f64 {
+pub fn quantile(a: f64, b: f64, probability: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     loop {
         let middle = f64::midpoint(low, high);
@@ -112,12 +112,12 @@ mod tests {
             for n in [0.3, 1.0, 7.0, 4096.0, 1e7] {
                 // Of a = n and b = 1 the probability below x is x^n.
                 let exact = libm::pow(p, 1.0 / n);
-                let found = beta_quantile(n, 1.0, p);
+                let found = quantile(n, 1.0, p);
                 assert!(
                     (found - exact).abs() < 1e-9 * exact,
                     "{p} {n}: {found} {exact}"
                 );
-                let other = 1.0 - beta_quantile(1.0, n, 1.0 - p);
+                let other = 1.0 - quantile(1.0, n, 1.0 - p);
                 assert!((other - exact).abs() < 1e-9, "{p} {n}: {other} {exact}");
             }
         }
