@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 
 use crate::Finding;
 
-pub(crate) use held::{read, read_table};
+pub use held::{read as read_value, read_table};
 
 /// A value as TOML.
 ///

@@ -35,13 +35,13 @@ const COUNTS: [(&str, &str); 4] = [
 ];
 
 /// Unit that a key ends with or is, such as `mm` of `standoff_mm` and `kg`; empty if it has none.
-pub(crate) fn unit_of(key: &str) -> &'static str {
+pub fn unit_of(key: &str) -> &'static str {
     let found = (UNITS.iter()).find(|(end, ..)| key.ends_with(end) || end[1..] == *key);
     found.map_or("", |(_, unit, _)| unit)
 }
 
 /// A number with all its digits and no more zeros than one can count: 1e308, 0.5, 1e-9.
-pub(crate) fn written(number: f64) -> String {
+pub fn written(number: f64) -> String {
     let is_short = number == 0.0 || (1e-4..1e7).contains(&number.abs());
     if is_short || !number.is_finite() {
         number.to_string()

@@ -14,8 +14,10 @@ use crate::toml_value;
 
 /// A parsed file together with where everything stands in it.
 #[derive(Debug)]
-pub(crate) struct TomlText<'a> {
+pub struct TomlText<'a> {
+    /// The file, as the user named it.
     pub file: &'a str,
+    /// Its text.
     pub text: &'a str,
     /// Values with their places.
     places: Spanned<DeTable<'a>>,
@@ -24,7 +26,7 @@ pub(crate) struct TomlText<'a> {
 
 impl<'a> TomlText<'a> {
     /// Of values that stand in no text: findings have keys but no lines.
-    pub(crate) fn without_text(file: &'a str) -> Self {
+    pub fn without_text(file: &'a str) -> Self {
         Self {
             file,
             text: "",
@@ -33,7 +35,11 @@ impl<'a> TomlText<'a> {
         }
     }
 
-    pub(crate) fn parse(file: &'a str, text: &'a str) -> Result<Self, Finding> {
+    /// Parses a text.
+    ///
+    /// # Errors
+    /// What is no TOML, with its place.
+    pub fn parse(file: &'a str, text: &'a str) -> Result<Self, Finding> {
         let places = DeTable::parse(text).map_err(|error| {
             let mut message = error.message().to_owned();
             let Some(span) = error.span() else {
@@ -63,7 +69,7 @@ impl<'a> TomlText<'a> {
     }
 
     /// Values that may be meant in another unit than their keys say, in words.
-    pub(crate) fn doubts(&self) -> Vec<String> {
+    pub fn doubts(&self) -> Vec<String> {
         slips::doubtful_units(&self.values)
     }
 
@@ -71,7 +77,7 @@ impl<'a> TomlText<'a> {
     ///
     /// # Errors
     /// All that its schema refuses.
-    pub(crate) fn read<T: DeserializeOwned>(&self, schema: &FileSchema) -> Result<T, Vec<Finding>> {
+    pub fn read<T: DeserializeOwned>(&self, schema: &FileSchema) -> Result<T, Vec<Finding>> {
         let misfits = schema.check(&self.values);
         if !misfits.is_empty() {
             let mut findings: Vec<Finding> = misfits
@@ -98,7 +104,7 @@ impl<'a> TomlText<'a> {
     }
 
     /// Where the value of a key stands: `goals[0].entry_mm` and so on.
-    pub(crate) fn span_of(&self, path: &str) -> Option<Range<usize>> {
+    pub fn span_of(&self, path: &str) -> Option<Range<usize>> {
         self.place_of(path).map(|(_, value)| value)
     }
 
@@ -126,7 +132,7 @@ impl<'a> TomlText<'a> {
     }
 
     /// A finding about a key of this file; a missing key's is placed at the table that lacks it.
-    pub(crate) fn finding(&self, key: &str, message: impl Into<String>) -> Finding {
+    pub fn finding(&self, key: &str, message: impl Into<String>) -> Finding {
         let finding = Finding::new(self.file, message).key(key);
         let mut path = key;
         loop {
@@ -189,7 +195,7 @@ fn value(at: Path<'_>, spanned: &Spanned<DeValue<'_>>) -> Result<Value, Beyond> 
             Value::Integer(parsed.map_err(|_| {
                 beyond(
                     format!("`{at}` is {number}, which has more than 64 bits"),
-                    "whole numbers of TOML lie within 2^63 of 0",
+                    "whole numbers of TOML are within 2^63 of 0",
                 )
             })?)
         }

@@ -8,8 +8,8 @@ use percent_encoding::percent_decode_str;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::finding::Finding;
-use crate::input::read_data;
+use crate::Finding;
+use crate::read::read_data;
 
 static BUILTIN: Dir<'static> = include_dir!("$OUT_DIR/models");
 
@@ -18,7 +18,7 @@ const BUILTIN_PREFIX: &str = "builtin:";
 
 /// Where a file is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Location {
+pub enum Location {
     /// Path inside the shipped `models` folder.
     Builtin(PathBuf),
     /// Path on disk.
@@ -60,7 +60,7 @@ impl PackagePaths {
 impl Location {
     /// Reads a model reference of a scenario: the name of a shipped model, or a path relative to
     /// the scenario's folder. `folder` and `extension` say where shipped ones are.
-    pub(crate) fn of_model(reference: &str, folder: &str, extension: &str, base: &Path) -> Self {
+    pub fn of_model(reference: &str, folder: &str, extension: &str, base: &Path) -> Self {
         let name = reference.strip_prefix(BUILTIN_PREFIX).unwrap_or(reference);
         let builtin = PathBuf::from(folder).join(format!("{name}.{extension}"));
         let is_name = !name.contains(['/', '\\']) && Path::new(name).extension().is_none();
@@ -71,13 +71,13 @@ impl Location {
     }
 
     /// The shipped file that a name with `builtin:` says, if it does.
-    pub(crate) fn builtin(name: &str) -> Option<Self> {
+    pub fn builtin(name: &str) -> Option<Self> {
         let path = Path::new(name.strip_prefix(BUILTIN_PREFIX)?);
         Some(Self::Builtin(path.components().collect()))
     }
 
     /// Names of the shipped folders that hold a file of this name.
-    pub(crate) fn builtin_folders_with(file: &str) -> Vec<String> {
+    pub fn builtin_folders_with(file: &str) -> Vec<String> {
         let mut names: Vec<String> = BUILTIN
             .dirs()
             .filter(|folder| BUILTIN.get_file(folder.path().join(file)).is_some())
@@ -88,7 +88,7 @@ impl Location {
     }
 
     /// Names of the shipped models in a folder.
-    pub(crate) fn builtin_names(folder: &str, extension: &str) -> Vec<String> {
+    pub fn builtin_names(folder: &str, extension: &str) -> Vec<String> {
         let mut names: Vec<String> = BUILTIN
             .get_dir(folder)
             .into_iter()
@@ -105,14 +105,18 @@ impl Location {
     }
 
     /// As users see it.
-    pub(crate) fn display(&self) -> String {
+    pub fn display(&self) -> String {
         match self {
             Self::Builtin(path) => format!("{BUILTIN_PREFIX}{}", path.display()),
             Self::Disk(path) => path.display().to_string(),
         }
     }
 
-    pub(crate) fn read(&self) -> Result<Vec<u8>, String> {
+    /// All bytes of the file.
+    ///
+    /// # Errors
+    /// Why it cannot be read, in words.
+    pub fn read(&self) -> Result<Vec<u8>, String> {
         match self {
             Self::Builtin(path) => {
                 let file = BUILTIN.get_file(path);
@@ -125,7 +129,7 @@ impl Location {
     }
 
     /// Whether there is such a file.
-    pub(crate) fn is_there(&self) -> bool {
+    pub fn is_there(&self) -> bool {
         match self {
             Self::Builtin(path) => BUILTIN.get_file(path).is_some(),
             Self::Disk(path) => path.is_file(),
@@ -133,7 +137,7 @@ impl Location {
     }
 
     /// Whether both are the same file, by whatever path.
-    pub(crate) fn is_same_file(&self, other: &Self) -> bool {
+    pub fn is_same_file(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Disk(a), Self::Disk(b)) => {
                 a == b
@@ -147,13 +151,13 @@ impl Location {
     }
 
     /// Name of the folder that the file is in; none in the working directory.
-    pub(crate) fn folder_name(&self) -> Option<String> {
+    pub fn folder_name(&self) -> Option<String> {
         let (Self::Builtin(path) | Self::Disk(path)) = self;
         Some(path.parent()?.file_name()?.to_str()?.to_owned())
     }
 
     /// A file by its path relative to this one's folder.
-    pub(crate) fn beside(&self, name: &str) -> Self {
+    pub fn beside(&self, name: &str) -> Self {
         let sibling = |path: &Path| path.parent().unwrap_or(Path::new("")).join(name);
         match self {
             Self::Builtin(path) => Self::Builtin(normalized(&sibling(path))),
@@ -164,13 +168,13 @@ impl Location {
     /// A mesh file that a URDF at `self` names: a path, `file://`, `package://NAME/...` or Gazebo's `model://NAME/...`.
     ///
     /// Names are URIs where a file of that very name is not there: `%20` is a blank then.
-    pub(crate) fn mesh(&self, name: &str, packages: &PackagePaths) -> Result<Self, String> {
+    pub fn mesh(&self, name: &str, packages: &PackagePaths) -> Result<Self, String> {
         let found = self.mesh_as_named(name, packages)?;
         if !name.contains('%') || found.is_there() {
             return Ok(found);
         }
         let decoded = percent_decode_str(name).decode_utf8();
-        let decoded = decoded.map_err(|_| "its `%` escapes are no UTF-8 text".to_owned())?;
+        let decoded = decoded.map_err(|_| "its `%` escapes are not UTF-8 text".to_owned())?;
         let other = self.mesh_as_named(&decoded, packages)?;
         Ok(if other.is_there() { other } else { found })
     }
@@ -195,7 +199,7 @@ impl Location {
             .filter(|(scheme, _)| *scheme != "file")
         {
             return Err(format!(
-                "`{scheme}://` is no place that is looked in: a path, file://, package:// or model:// is"
+                "`{scheme}://` is not supported: use a path, file://, package:// or model://"
             ));
         }
         let path = name
@@ -230,7 +234,7 @@ pub struct ModelSource {
 }
 
 /// Name and SHA-256 of a file.
-pub(crate) fn source_of(file: String, bytes: &[u8]) -> ModelSource {
+pub fn source_of(file: String, bytes: &[u8]) -> ModelSource {
     ModelSource {
         file,
         sha256: sha256_hex(bytes),

@@ -9,7 +9,7 @@ use toml::{Table, Value};
 
 use crate::schema::unit_of;
 
-/// How to mend the line in which a text ceases to be TOML, where that can be told.
+/// How to fix the line in which a text ceases to be TOML, where that can be told.
 pub(super) fn hint_about(text: &str, span: Range<usize>) -> Option<String> {
     let at = span.start.min(text.len());
     let start = text.get(..at)?.rfind('\n').map_or(0, |end| end + 1);
@@ -23,7 +23,7 @@ pub(super) fn hint_about(text: &str, span: Range<usize>) -> Option<String> {
     // By itself it is TOML: what is wrong is that it was there before.
     if line.parse::<Table>().is_ok() {
         return Some(format!(
-            "`{key}` stands twice in its section: keep one of the lines"
+            "duplicate `{key}` in its section: keep one of the lines"
         ));
     }
     let is_number = |word: &str| word.parse::<f64>().is_ok();
@@ -37,16 +37,14 @@ pub(super) fn hint_about(text: &str, span: Range<usize>) -> Option<String> {
         && is_number(whole)
         && is_number(decimals)
     {
-        return Some(format!(
-            "decimals have a point: `{key} = {whole}.{decimals}`"
-        ));
+        return Some(format!("use a decimal point: `{key} = {whole}.{decimals}`"));
     }
     if let Some(inside) = value
         .strip_prefix('(')
         .and_then(|rest| rest.strip_suffix(')'))
     {
         return Some(format!(
-            "lists stand in square brackets: `{key} = [{inside}]`"
+            "write lists in square brackets: `{key} = [{inside}]`"
         ));
     }
     if let Some(inside) = value
@@ -220,7 +218,7 @@ mod tests {
             ("lesion = \u{201c}a\u{201d}", "plain quotes"),
             ("lesion = \"a", "end with the quote"),
             ("length_mm =", "a value after `length_mm =`"),
-            ("a = 2", "`a` stands twice"),
+            ("a = 2", "duplicate `a`"),
         ] {
             let found = hint(line);
             assert!(found.contains(wanted), "{line}: {found}");

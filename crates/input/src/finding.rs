@@ -1,11 +1,11 @@
-//! What is wrong with an input file, said so that its author can mend it.
+//! What is wrong with an input file, said so that its author can fix it.
 
 use std::fmt;
 use std::ops::Range;
 
 use serde::Serialize;
 
-/// One thing wrong with an input: where, what, and how to mend it.
+/// One thing wrong with an input: where, what, and how to fix it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, thiserror::Error)]
 pub struct Finding {
     /// File as the user named it.
@@ -16,11 +16,15 @@ pub struct Finding {
     pub key: Option<String>,
     /// What is wrong, with value and unit.
     pub message: String,
-    /// How to mend it.
+    /// How to fix it.
     pub hint: Option<String>,
     /// Byte range in the file's text, for a caret under the place.
     #[serde(skip)]
     pub span: Option<Range<usize>>,
+    /// Nothing is wrong with the input: everything was tried, and nothing is feasible. In a study such a layout counts
+    /// as one without a feasible configuration, not as an invalid layout.
+    #[serde(skip)]
+    pub nothing_serves: bool,
 }
 
 impl Finding {
@@ -33,6 +37,7 @@ impl Finding {
             message: message.into(),
             hint: None,
             span: None,
+            nothing_serves: false,
         }
     }
 
@@ -62,6 +67,11 @@ impl Finding {
         self.span = Some(span);
         self
     }
+}
+
+/// Whether nothing is wrong with an input, but nothing is feasible: [`Finding::nothing_serves`] of all findings.
+pub fn nothing_serves(findings: &[Finding]) -> bool {
+    !findings.is_empty() && findings.iter().all(|finding| finding.nothing_serves)
 }
 
 impl fmt::Display for Finding {

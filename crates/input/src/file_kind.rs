@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use crate::Finding;
-use crate::input::{read_data, read_text};
+use crate::read::{read_data, read_text};
 
 /// Kinds of files and folders that commands take or make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -124,16 +124,16 @@ impl FileKind {
             Self::Scenario => "a scenario",
             Self::Study => "a study",
             Self::Thresholds => "a file of thresholds",
-            Self::Arm => "an arm's data",
-            Self::LogColumns => "a table of a log's columns",
-            Self::PhantomSizes => "a file of a phantom's sizes",
+            Self::Arm => "arm data",
+            Self::LogColumns => "a table of log columns",
+            Self::PhantomSizes => "a phantom parameter file",
             Self::Urdf => "a URDF of a robot or a tool",
             Self::Calibration => "a YAML file, such as a factory calibration",
             Self::Mesh => "a surface",
             Self::Table => "a table of numbers, such as a recorded log",
             Self::Mcap => "a recorded run",
             Self::Page => "a page",
-            Self::StudyTable => "the table of a study's results",
+            Self::StudyTable => "the results table of a study",
             Self::Report => "the report of a run",
             Self::RunResults => "a folder with the results of a run",
             Self::StudyResults => "a folder with the results of a study",

@@ -9,7 +9,7 @@ use super::{HINT, OFF, UNIT};
 
 /// What a value may be.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Node {
+pub enum Node {
     /// Anything at all.
     Anything,
     /// True or false.
@@ -28,7 +28,7 @@ pub(crate) enum Node {
 
 /// Least and greatest value.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Limits<N> {
+pub struct Limits<N> {
     pub least: N,
     pub most: N,
     /// The least value itself is left out.
@@ -37,12 +37,12 @@ pub(crate) struct Limits<N> {
     pub or_off: bool,
     /// As written after a number; empty for plain numbers.
     pub unit: String,
-    /// How to mend what is outside, if there is more to say than the unit.
+    /// How to fix what is outside, if there is more to say than the unit.
     pub hint: Option<String>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Text {
+pub struct Text {
     /// All that it may be, unless empty.
     pub one_of: Vec<String>,
     /// Characters that a name may have besides letters and digits; any text if there is none.
@@ -53,7 +53,7 @@ pub(crate) struct Text {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct List {
+pub struct List {
     /// What its items are; the last is for all that follow.
     pub items: Vec<Node>,
     pub least: usize,
@@ -62,14 +62,14 @@ pub(crate) struct List {
 }
 
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Table {
+pub struct Table {
     pub keys: BTreeMap<String, Entry>,
     /// What keys besides these may be, and have for a value; none if there is none.
     pub others: Option<Box<(Text, Node)>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
+pub struct Entry {
     pub node: Node,
     pub is_required: bool,
 }

@@ -11,17 +11,20 @@ use crate::nearest_name;
 
 /// One thing that does not fit.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Misfit {
+pub struct Misfit {
     /// The key at fault: `goals[0].entry_mm[2]`.
     pub key: String,
+    /// What kind of thing is wrong.
     pub kind: MisfitKind,
     /// What is wrong, with the value.
     pub message: String,
+    /// How to mend it.
     pub hint: Option<String>,
 }
 
+/// What kind of thing does not fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum MisfitKind {
+pub enum MisfitKind {
     /// A key that is not known.
     Unknown,
     /// A key that is not there; `key` names it.
@@ -34,9 +37,12 @@ pub(crate) enum MisfitKind {
 
 /// Way from the top of a file to a value.
 #[derive(Clone, Copy)]
-pub(crate) enum Path<'a> {
+pub enum Path<'a> {
+    /// The whole file.
     Top,
+    /// A key of a table.
     Key(&'a Path<'a>, &'a str),
+    /// An item of a list, from 0.
     Index(&'a Path<'a>, usize),
 }
 
@@ -103,7 +109,7 @@ impl Node {
         };
         let hint = match self {
             Self::Number(limits) if limits.or_off => Some(format!(
-                "a word is \"{SWITCHED_OFF}\", which switches it off"
+                "the only word allowed is \"{SWITCHED_OFF}\", which switches it off"
             )),
             Self::Number(_) => Some(match in_words(unit_of(at.name())) {
                 "" => "give a plain number, in the unit in its name".to_owned(),
@@ -114,9 +120,9 @@ impl Node {
             }
             Self::Truth => Some("write true or false, without quotes".to_owned()),
             Self::List(List { items, .. }) => Some(match (&items[0], value) {
-                (Self::Table(_), Value::Table(_)) => format!(
-                    "there may be several: write [[{at}]] in double brackets, once for each"
-                ),
+                (Self::Table(_), Value::Table(_)) => {
+                    format!("there may be several: write [[{at}]] in double brackets, one for each")
+                }
                 (Self::Table(_), _) => format!("write a [[{at}]] section for each"),
                 (Self::Text(_), Value::String(_)) => format!("write it in brackets: [{value}]"),
                 _ => format!("such as `{} = {}`", at.name(), self.example(at.name())),
@@ -154,7 +160,7 @@ fn shown(value: &Value) -> String {
 }
 
 /// Numbers that have limits.
-pub(crate) trait Limited: Copy + PartialOrd + fmt::Display {
+pub trait Limited: Copy + PartialOrd + fmt::Display {
     fn is_finite(self) -> bool;
     fn times(self, factor: i32) -> Self;
     /// As a message writes it.
@@ -237,7 +243,7 @@ impl<N: Limited> Limits<N> {
                 "" => "it is a plain number".to_owned(),
                 unit => format!("the value is in {unit}"),
             };
-            return format!("{unit}; \"{SWITCHED_OFF}\" in its place switches it off");
+            return format!("{unit}; \"{SWITCHED_OFF}\" switches it off");
         }
         let meant = |factor: i32| self.unit == "mm" && self.holds(number.times(factor));
         match self.unit.as_str() {
@@ -257,7 +263,7 @@ impl Text {
             if self.one_of.iter().any(|each| each == value) {
                 return;
             }
-            let message = format!("`{value}` is not a value that `{at}` can have");
+            let message = format!("`{value}` is not a valid value of `{at}`");
             let known = self.one_of.iter().map(String::as_str);
             let hint = match nearest_name(value, known) {
                 Some(near) => format!("did you mean `{near}`?"),
@@ -308,7 +314,7 @@ impl Text {
 }
 
 impl List {
-    /// How to mend a list of another length.
+    /// How to fix a list of another length.
     fn hint_about(&self, at: Path<'_>, values: &[Value]) -> Option<String> {
         let is_whole = |value: &Value| value.is_integer();
         // Lists without an end have the largest number as their most.
@@ -320,7 +326,7 @@ impl List {
                 .map(|pair| format!("{}.{}", pair[0], pair[1]));
             let numbers: Vec<String> = pairs.collect();
             return Some(format!(
-                "decimals have a point, commas stand between numbers: [{}]",
+                "use points for decimals and commas between numbers: [{}]",
                 numbers.join(", ")
             ));
         }
@@ -437,11 +443,11 @@ fn nearest_key<'k>(unknown: &str, known: &[&'k str]) -> Option<&'k str> {
         .or_else(|| nearest_name(unknown, known.iter().copied()))
 }
 
-/// How to mend a key that is not known; `known` are those that are.
+/// How to fix a key that is not known; `known` are those that are.
 pub(super) fn unknown_key_hint(unknown: &str, known: &[&str]) -> String {
     match nearest_key(unknown, known) {
         Some(same) if quantity(same) == quantity(unknown) => {
-            format!("did you mean `{same}`? The key says the unit")
+            format!("did you mean `{same}`? The key states the unit")
         }
         Some(near) => format!("did you mean `{near}`?"),
         None if known.is_empty() => "it takes no keys".to_owned(),

@@ -18,39 +18,40 @@ use schemars::JsonSchema;
 use serde_json::Value;
 
 use check::unknown_key_hint;
-pub(crate) use check::{Misfit, MisfitKind, Path};
-pub(crate) use node::Node;
-pub(crate) use unit::{unit_of, written};
+pub use check::{Misfit, MisfitKind, Path};
+pub use node::Node;
+pub use unit::{unit_of, written};
 
 /// Unit of a number, where its key does not end with it.
 pub(crate) const UNIT: &str = "x-unit";
 
-/// How to mend a value out of its range, where there is more to say than its unit.
+/// How to fix a value out of its range, where there is more to say than its unit.
 pub(crate) const HINT: &str = "x-hint";
 
 /// Whether a number may be switched off by the word "off".
 pub(crate) const OFF: &str = "x-off";
 /// Word in place of a number that switches the value off.
-pub(crate) const SWITCHED_OFF: &str = "off";
+pub const SWITCHED_OFF: &str = "off";
 
 /// Longest name: file systems take 255 bytes, some 143, and a name gets endings such as
 /// `.ranking.svg` and the name of a configuration beside it.
-pub(crate) const LONGEST_NAME: usize = 100;
+pub const LONGEST_NAME: usize = 100;
 
 /// Names that become file names.
-pub(crate) const NAME: &str = "^[A-Za-z0-9_-]+$";
+pub const NAME: &str = "^[A-Za-z0-9_-]+$";
 
 /// Names that become columns of tables.
-pub(crate) const COLUMN: &str = "^[A-Za-z0-9_]+$";
+pub const COLUMN: &str = "^[A-Za-z0-9_]+$";
 
 /// The schema of one kind of file.
 #[derive(Debug)]
-pub(crate) struct FileSchema {
+pub struct FileSchema {
     json: Value,
     node: Node,
 }
 
 impl FileSchema {
+    /// From a struct with the ranges at its fields.
     pub fn of<T: JsonSchema>() -> Self {
         let mut json = schemars::generate::SchemaSettings::draft07()
             .into_generator()

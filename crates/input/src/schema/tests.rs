@@ -152,7 +152,7 @@ fn values_of_another_type_are_named_with_what_belongs_there() {
         (
             "way = \"bak\"",
             "way",
-            "`bak` is not a value that `way` can have",
+            "`bak` is not a valid value of `way`",
         ),
         (
             "many = [{ angle_deg = true }]",
@@ -185,7 +185,7 @@ fn unknown_and_missing_keys_are_named_where_they_belong() {
     // The wrong name is all that is wrong, though the right one is missing.
     let (line, key, _, hint) = only("name = \"a\"\n[inside]\nangle_rad = 1");
     assert_eq!((line, key.as_str()), (3, "inside.angle_rad"));
-    assert_eq!(hint, "did you mean `angle_deg`? The key says the unit");
+    assert_eq!(hint, "did you mean `angle_deg`? The key states the unit");
     let (line, key, message, _) = only("name = \"a\"\n[inside]\nis_on = true");
     assert_eq!((line, key.as_str()), (2, "inside.angle_deg"));
     assert_eq!(message, "the key `angle_deg` is missing");

@@ -57,7 +57,7 @@ fn is_hidden(character: char) -> bool {
 }
 
 /// Lines of a comment, as TOML and YAML have them.
-pub(crate) fn commented(text: &str) -> String {
+pub fn commented(text: &str) -> String {
     text.lines().fold(String::new(), |mut out, line| {
         out.extend(["# ", line, "\n"]);
         out

@@ -27,13 +27,13 @@ pub enum InputError {
         what: &'static str,
     },
     /// It is larger than any of its kind.
-    #[error("it has more than {} MiB, the most that is read of such a file", limit >> 20)]
+    #[error("it is larger than {} MiB, the limit for such a file", limit >> 20)]
     TooLarge {
         /// The limit, bytes.
         limit: u64,
     },
     /// It is no text.
-    #[error("it is no UTF-8 text: byte {at} is the first that is not")]
+    #[error("it is not UTF-8 text: first invalid byte {at}")]
     NotText {
         /// Offset of the first byte that is wrong.
         at: usize,
@@ -46,13 +46,11 @@ impl InputError {
         matches!(self, Self::Io(error) if error.kind() == io::ErrorKind::NotFound)
     }
 
-    /// How to mend it; `otherwise` where the error says nothing of that.
+    /// How to fix it; `otherwise` where the error says nothing of that.
     pub fn hint<'a>(&self, otherwise: &'a str) -> &'a str {
         match self {
             Self::NotText { .. } => "save the file as UTF-8 text",
-            Self::NotRegular { .. } => {
-                "give a file, and write what comes through a pipe into one first"
-            }
+            Self::NotRegular { .. } => "give a file; write the output of a pipe to a file first",
             Self::Io(_) | Self::TooLarge { .. } => otherwise,
         }
     }
@@ -74,7 +72,7 @@ pub fn open_input(path: &Path) -> Result<File, InputError> {
 ///
 /// # Errors
 /// See [`InputError`].
-pub(crate) fn read_data(path: &Path) -> Result<Vec<u8>, InputError> {
+pub fn read_data(path: &Path) -> Result<Vec<u8>, InputError> {
     read(path, MOST_DATA_BYTES)
 }
 
