@@ -1,6 +1,6 @@
 //! What can be wrong with phantom parameters.
 
-use crate::schema::Misfit;
+use needlebench_input::schema::Misfit;
 
 /// Why a phantom cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -27,7 +27,7 @@ pub enum PhantomError {
         key: String,
         /// What is wrong with its value.
         message: String,
-        /// How to mend it.
+        /// How to fix it.
         hint: Option<String>,
     },
     /// Two lesions or two markers share a name.
@@ -40,7 +40,7 @@ pub enum PhantomError {
     },
     /// The chest walls leave no space for the thoracic organs.
     #[error(
-        "phantom chest walls leave {room_mm:.1} mm of {what}, less than {needed_mm:.1} mm: \
+        "phantom chest walls leave {room_mm:.1} mm of {what}, {needed_mm:.1} mm required: \
          reduce the wall thicknesses or enlarge the chest"
     )]
     NoRoom {
@@ -52,7 +52,7 @@ pub enum PhantomError {
         needed_mm: f64,
     },
     /// An anatomical part would break through the skin.
-    #[error("phantom part `{part}` sticks {by_mm:.1} mm out of the skin: enlarge the chest walls")]
+    #[error("phantom part `{part}` extends {by_mm:.1} mm out of the skin: enlarge the chest walls")]
     PartOutsideSkin {
         /// Name of the part.
         part: String,
@@ -61,8 +61,8 @@ pub enum PhantomError {
     },
     /// A lesion is not wholly inside the skin.
     #[error(
-        "lesion `{lesion}` at ({:.1}, {:.1}, {:.1}) mm of the phantom frame is not wholly inside \
-         the skin: it sticks out by {by_mm:.1} mm", center_mm[0], center_mm[1], center_mm[2]
+        "lesion `{lesion}` at ({:.1}, {:.1}, {:.1}) mm in the phantom frame is not entirely inside \
+         the skin: it extends out by {by_mm:.1} mm", center_mm[0], center_mm[1], center_mm[2]
     )]
     LesionOutsideSkin {
         /// Name of the lesion.

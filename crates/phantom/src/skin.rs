@@ -7,7 +7,7 @@ use super::half_spaces::HalfSpaces;
 
 /// The outer surface, in the phantom frame.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum SkinSurface {
+pub enum SkinSurface {
     /// Face planes of a convex skin.
     Convex(HalfSpaces),
     /// Any other closed surface.
@@ -32,7 +32,7 @@ impl SkinSurface {
     }
 
     /// Whether a point is inside.
-    pub(crate) fn contains(&self, point: &Point3<f64>) -> bool {
+    pub fn contains(&self, point: &Point3<f64>) -> bool {
         match self {
             Self::Convex(faces) => faces.depth_m(point) >= 0.0,
             Self::Mesh(surface) => surface.contains(point),
@@ -58,7 +58,7 @@ impl SkinSurface {
     }
 
     /// See `Phantom::skin_signed_depth`.
-    pub(crate) fn depth_m(&self, point: &Point3<f64>) -> f64 {
+    pub fn depth_m(&self, point: &Point3<f64>) -> f64 {
         match self {
             Self::Convex(faces) => faces.depth_m(point),
             Self::Mesh(surface) => -surface.signed_distance_m(point),

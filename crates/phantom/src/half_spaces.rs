@@ -12,11 +12,11 @@ struct HalfSpace {
 
 /// The face planes of a convex body, in the frame that the body's solid is placed in.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct HalfSpaces(Vec<HalfSpace>);
+pub struct HalfSpaces(Vec<HalfSpace>);
 
 impl HalfSpaces {
     /// Face planes of a convex solid; `None` if the solid is not a convex mesh.
-    pub(crate) fn of(solid: &Solid) -> Option<Self> {
+    pub fn of(solid: &Solid) -> Option<Self> {
         let Shape::Convex(mesh) = &solid.shape else {
             return None;
         };

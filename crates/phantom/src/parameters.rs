@@ -3,25 +3,60 @@
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
+use needlebench_input::schema::{FileSchema, LONGEST_NAME, NAME};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::PhantomError;
-use crate::scenario::{ChestSize, MarkerKind};
-use crate::schema::{FileSchema, LONGEST_NAME, NAME};
 
 /// What a parameter file may hold.
-pub(crate) static PARAMETERS: LazyLock<FileSchema> =
-    LazyLock::new(FileSchema::of::<PhantomParameters>);
+pub static PARAMETERS: LazyLock<FileSchema> = LazyLock::new(FileSchema::of::<PhantomParameters>);
 
-/// How people lay or stood whose chests a phantom's breadth and depth are.
+/// Position of the people on whom a phantom's breadth and depth were measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Measured {
     /// Upright, as in surveys of body sizes.
     Standing,
-    /// On the back, as in CT.
+    /// Supine, as in CT.
     Supine,
+}
+
+/// Position of the patient's arms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Arms {
+    /// Not modelled: the robot may pass through the space of the arms.
+    #[default]
+    None,
+    /// At the sides, along the body.
+    Beside,
+    /// Raised above the head, as for a chest CT.
+    Overhead,
+}
+
+/// Type of the skin markers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MarkerKind {
+    /// A plastic disc, for cameras and digitising; isodense with skin in CT.
+    #[default]
+    Disc,
+    /// The same disc on a foam carrier with a dense sphere on the skin, also visible in CT.
+    CtSphere,
+}
+
+/// Minimum and maximum chest sizes: beyond the smallest and largest adults on record, with margin for children's and
+/// obese phantoms; they catch wrong units.
+pub struct ChestSize;
+
+impl ChestSize {
+    /// Breadth, mm.
+    pub const BREADTH_MM: [f64; 2] = [150.0, 600.0];
+    /// Depth, mm.
+    pub const DEPTH_MM: [f64; 2] = [120.0, 600.0];
+    /// Length, mm.
+    pub const LENGTH_MM: [f64; 2] = [200.0, 700.0];
 }
 
 /// Size and contents of a chest phantom.
@@ -31,7 +66,7 @@ pub enum Measured {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhantomParameters {
-    /// How they lay or stood whose breadth and depth these are; not said when the key is left out.
+    /// Position of the people on whom breadth and depth were measured. Default: not stated.
     #[serde(default)]
     pub measured: Option<Measured>,
     /// Breadth of the chest over the skin at its widest level, left to right, without arms, mm.
@@ -85,7 +120,7 @@ pub struct PhantomParameters {
     #[serde(default = "default_marker_thickness_mm")]
     #[schemars(range(min = 0.2, max = 5.0))]
     pub marker_thickness_mm: f64,
-    /// `disc`, or `ct_sphere` for markers that CT sees too.
+    /// `disc`, or `ct_sphere` for markers that are also visible in CT.
     #[serde(default)]
     pub marker_kind: MarkerKind,
     /// Diameter of the sphere of `ct_sphere` markers, mm; their discs lie so much higher above the skin.
@@ -95,15 +130,15 @@ pub struct PhantomParameters {
     /// Head and arms, for scenarios that have them.
     #[serde(default)]
     pub limbs: LimbSizes,
-    /// Lesions; none when the key is left out.
+    /// Lesions. Default: none.
     #[serde(default)]
     pub lesions: Vec<LesionParameters>,
-    /// Skin markers; none when the key is left out.
+    /// Skin markers. Default: none.
     #[serde(default)]
     pub markers: Vec<MarkerParameters>,
 }
 
-/// Sizes of head and arms; those of the median man (ANSUR II) where they are left out.
+/// Sizes of head and arms. Default: those of the median man (ANSUR II).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LimbSizes {
@@ -229,7 +264,7 @@ macro_rules! preset {
             $name,
             include_str!(concat!(
                 env!("CARGO_MANIFEST_DIR"),
-                "/models/chest_phantom/",
+                "/chest_phantom/",
                 $name,
                 ".toml"
             )),

@@ -1,7 +1,7 @@
 //! Head and arms: what of the patient, besides the chest, a robot beside the table may hit.
 //!
 //! Capsules in the phantom's frame. They lie on what the chest lies on and never lower, so where they are
-//! depends on how the patient lies. Lengths and circumferences are measured ones (ANSUR II, see
+//! depends on the patient position. Lengths and circumferences are measured ones (ANSUR II, see
 //! `models/chest_phantom/README.md`); how a raised arm is bent is assumed.
 
 use std::f64::consts::PI;
@@ -11,14 +11,14 @@ use needlebench_geometry::Solid;
 
 use super::solids::capsule;
 use super::{PhantomParameters, PhantomPart, SKIN_RGBA, Tissue};
-use crate::scenario::Arms;
+use crate::Arms;
 
 /// Height of the suprasternal notch as a share of the half length: where the layout has it.
 const NOTCH: f64 = 144.0 / 204.0;
 
 /// A plane that carries the patient, in the phantom's frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Support {
+pub struct Support {
     /// Downwards.
     pub down: UnitVector3<f64>,
     /// Where the plane is along that, m.
@@ -45,7 +45,7 @@ impl Support {
 }
 
 /// Head and arms of a size, as far as they are wanted.
-pub(crate) fn limbs(
+pub fn limbs(
     parameters: &PhantomParameters,
     arms: Arms,
     head: bool,

@@ -8,7 +8,7 @@ use super::half_spaces::HalfSpaces;
 use super::parameters::MarkerParameters;
 use super::solids::{ball, cuboid, cylinder, facing, pose};
 use super::{Marker, MarkerSphere, PhantomError, PhantomParameters, PhantomPart, Tissue};
-use crate::scenario::MarkerKind;
+use crate::MarkerKind;
 
 const WHITE_RGBA: [f32; 4] = [0.97, 0.97, 0.97, 1.0];
 const BLACK_RGBA: [f32; 4] = [0.04, 0.04, 0.04, 1.0];

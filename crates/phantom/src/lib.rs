@@ -5,6 +5,7 @@
 //!
 //! The same parameters always give the same phantom, bit for bit. The sources of the numbers are
 //! in `models/chest_phantom/README.md`.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod envelope;
 mod error;
@@ -31,20 +32,22 @@ use needlebench_geometry::Solid;
 use serde::{Deserialize, Serialize};
 
 pub use error::PhantomError;
-pub(crate) use parameters::PARAMETERS;
-pub use parameters::{LesionParameters, LimbSizes, MarkerParameters, Measured, PhantomParameters};
+pub use parameters::PARAMETERS;
+pub use parameters::{
+    Arms, ChestSize, LesionParameters, LimbSizes, MarkerKind, MarkerParameters, Measured,
+    PhantomParameters,
+};
 pub use route_obstacles::{RouteObstacle, RouteObstacles};
 
-#[cfg(test)]
-pub(crate) use loft::assert_convex_and_closed;
-
 use envelope::Envelope;
-pub(crate) use half_spaces::HalfSpaces;
-pub(crate) use limbs::{Support, limbs};
-pub(crate) use skin::SkinSurface;
+pub use half_spaces::HalfSpaces;
+pub use limbs::{Support, limbs};
+pub use skin::SkinSurface;
 
-pub(crate) const SKIN_RGBA: [f32; 4] = [0.90, 0.72, 0.60, 0.35];
-pub(crate) const LESION_RGBA: [f32; 4] = [0.95, 0.80, 0.10, 1.0];
+/// Colour of the skin.
+pub const SKIN_RGBA: [f32; 4] = [0.90, 0.72, 0.60, 0.35];
+/// Colour of lesions.
+pub const LESION_RGBA: [f32; 4] = [0.95, 0.80, 0.10, 1.0];
 
 /// Names of the shipped sizes.
 pub const SIZE_PRESETS: [&str; parameters::PRESETS.len()] = {
@@ -220,7 +223,7 @@ impl Phantom {
     }
 
     /// Of these parts, the first of which is the skin with this surface.
-    pub(crate) fn of_parts(
+    pub fn of_parts(
         parameters: Option<PhantomParameters>,
         parts: Vec<PhantomPart>,
         lesions: Vec<Lesion>,

@@ -1,4 +1,4 @@
-use crate::scenario::MarkerKind;
+use crate::MarkerKind;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
