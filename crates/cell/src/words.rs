@@ -1,4 +1,4 @@
-//! The words in which people read parts of the room.
+//! Words for the parts of the room.
 //!
 //! Bodies and solids have names for machines, such as `wrist_2.1` and `intercostal_vessels_right_5.7`: these
 //! stand in JSON, Parquet and criteria, and stay as they are. Sentences, tables, charts and pages say
@@ -6,10 +6,10 @@
 
 use std::borrow::Cow;
 
-use crate::ClearanceClass;
+use crate::{ClearanceClass, Rule};
 
-/// Parts that are there once.
-const SINGLE: [(&str, &str); 27] = [
+/// Parts that exist once.
+const SINGLE: [(&str, &str); 28] = [
     ("base", "base"),
     ("shoulder", "shoulder"),
     ("upper_arm", "upper arm"),
@@ -19,8 +19,8 @@ const SINGLE: [(&str, &str); 27] = [
     ("wrist_3", "wrist 3"),
     ("tool", "tool"),
     ("guide_tube", "needle guide"),
-    ("needle_corridor", "space behind the guide"),
-    ("hand_cone", "space behind the guide"),
+    ("needle_corridor", "access zone"),
+    ("hand_cone", "access zone"),
     ("skin", "skin"),
     ("head", "patient's head"),
     ("neck", "patient's neck"),
@@ -37,9 +37,10 @@ const SINGLE: [(&str, &str); 27] = [
     ("vena_cava_superior", "superior vena cava"),
     ("vena_cava_inferior", "inferior vena cava"),
     ("spine", "spine"),
+    ("doctor", "physician"),
 ];
 
-/// Parts that are there on the left and on the right, as `NAME_SIDE`.
+/// Parts that exist on the left and on the right, as `NAME_SIDE`.
 const SIDED: [(&str, &str); 9] = [
     ("arm", "arm"),
     ("lung", "lung"),
@@ -76,30 +77,26 @@ pub fn pair_in_words(pair: &[String; 2]) -> String {
     format!("{} to {}", part_in_words(a), part_in_words(b))
 }
 
-/// Rules that reject configurations, and what a configuration that one rejects suffers from.
-const RULES: [(&str, &str); 13] = [
-    ("needle_route", "needle route blocked"),
-    ("unreachable", "out of reach"),
-    ("merged", "same as another"),
-    ("joint_limit", "joint limit"),
-    ("singular", "singular"),
-    ("collision", "collision"),
-    ("too_close", "too close"),
-    ("needle_corridor", "guide blocked"),
-    ("approach", "no approach"),
-    ("nearest_only", "not exact"),
-    ("no_motion", "no motion"),
-    ("max_tip_position_error_mm", "tip error over its limit"),
-    ("max_tip_rms_mm", "expected tip error over its limit"),
+/// Reasons that are no rules, as rows of studies name them, in words.
+const OTHER_REASONS: [(&str, &str); 3] = [
+    ("no_entry", "no feasible entry"),
+    ("max_tip_position_error_mm", "tip error above limit"),
+    ("max_tip_rms_mm", "RMS tip error above limit"),
 ];
 
-/// What people call a rule that rejects configurations: one of `crate::REJECTION_RULES`.
-pub fn rule_in_words(rule: &str) -> &str {
-    let known = RULES.iter().find(|(name, _)| *name == rule);
-    known.map_or(rule, |(_, words)| words)
+/// The reason of this name in words, if it is a rule's or one of the others.
+fn known_reason(name: &str) -> Option<&'static str> {
+    let other = OTHER_REASONS.iter().find(|(known, _)| *known == name);
+    let rule = || Rule::named(name).map(Rule::in_words);
+    other.map(|(_, words)| *words).or_else(rule)
 }
 
-/// What meets what.
+/// The reason for rejection by a rule, in words; an unknown name stays as it is.
+pub fn rule_in_words(rule: &str) -> &str {
+    known_reason(rule).unwrap_or(rule)
+}
+
+/// The two bodies of a class, in words.
 fn class_in_words(class: ClearanceClass) -> [&'static str; 2] {
     match class {
         ClearanceClass::RobotPhantom => ["arm", "patient"],
@@ -111,16 +108,16 @@ fn class_in_words(class: ClearanceClass) -> [&'static str; 2] {
         ClearanceClass::SelfCollision => ["arm", "itself"],
         ClearanceClass::ToolPhantom => ["tool", "patient"],
         ClearanceClass::GuideStandoff => ["guide", "skin"],
-        ClearanceClass::NeedleCorridor => ["something", "the space behind the guide"],
-        ClearanceClass::NeedleRoute => ["needle", "what it must not meet"],
+        ClearanceClass::NeedleCorridor => ["body", "access zone"],
+        ClearanceClass::NeedleRoute => ["needle", "structure at risk"],
     }
 }
 
-/// Why a configuration does not work, as rows of studies name it, in words: `collision robot_mount` is `arm
+/// Why a configuration is infeasible, as rows of studies name it, in words: `collision robot_mount` is `arm
 /// collides with mount`.
 pub fn reason_in_words(detail: &str) -> String {
-    if RULES.iter().any(|(name, _)| *name == detail) {
-        return rule_in_words(detail).to_owned();
+    if let Some(words) = known_reason(detail) {
+        return words.to_owned();
     }
     let of_class = |prefix: &str, words: &str| {
         let class = ClearanceClass::named(detail.strip_prefix(prefix)?)?;
@@ -131,7 +128,7 @@ pub fn reason_in_words(detail: &str) -> String {
         .or_else(|| of_class("too_close ", "too close to"))
         .or_else(|| of_class("no_motion ", "blocked by"))
         .or_else(|| of_class("min_clearance_mm.", "too close to"))
-        // A key of the scenario stays one, for layouts that cannot exist.
+        // A key of the scenario stays one, for invalid layouts.
         .unwrap_or_else(|| {
             if detail.contains('.') {
                 detail.to_owned()
@@ -163,6 +160,7 @@ fn named(body: &str) -> Option<String> {
     match body.split_once('_')? {
         (what @ "vertebra", level) => Some(format!("{what} {}", level.to_uppercase())),
         (what @ "lesion", name) => Some(format!("{what} {name}")),
+        ("doctor", number) if number.parse::<u8>().is_ok() => Some(format!("physician {number}")),
         _ => None,
     }
 }
@@ -206,16 +204,10 @@ mod tests {
             ("fissure_oblique_left", "left oblique fissure"),
             ("vertebra_t5.process", "vertebra T5"),
             ("lesion_pleural_based", "lesion pleural_based"),
+            ("doctor", "physician"),
+            ("doctor_2", "physician 2"),
         ] {
             assert_eq!(part_in_words(name), words, "{name}");
-        }
-    }
-
-    #[test]
-    fn every_rule_has_words() {
-        for rule in crate::scenario::REJECTION_RULES {
-            assert!(!rule_in_words(rule).contains('_'), "{rule}");
-            assert!(RULES.iter().any(|(name, _)| *name == rule), "{rule}");
         }
     }
 

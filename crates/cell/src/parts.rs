@@ -7,19 +7,12 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use needlebench_geometry::{ConvexMesh, Shape, Solid, TriangleMesh, Visual};
 use needlebench_kinematics::{
-    Body, Chain, Dynamics, JOINT_COUNT, JointLimits, Joints, Pose, UrGeometry, UrModel,
-    base_from_base_link,
+    Body, Chain, Dynamics, JOINT_COUNT, JointLimits, Joints, Pose, base_from_base_link,
 };
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-mod arm_in_use;
-mod pairs;
-
-use crate::arm::SAME_ARM_M;
-use crate::files::ModelSource;
-pub use arm_in_use::{ArmInUse, ArmReport};
-pub use pairs::{LeftOut, PairRule, pair_rule, place_in_chain};
+use crate::bodies::{BodyKind, ClearanceClass, CollisionBody, Frame};
+use crate::pairs::{PairRule, pair_rule};
 
 /// A link of the arm: geometry in the link's own frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,40 +25,13 @@ pub struct Link {
     pub visuals: Vec<Visual>,
 }
 
-/// A link of the URDF that a body of the arm was made of.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LinkMember {
-    /// Name in the URDF, e.g. `forearm_link`.
-    pub name: String,
-    /// The body: 0 for the base, 1 to 6 for the moving links.
-    pub owner: usize,
-    /// Whether it has collision geometry.
-    pub has_geometry: bool,
-    /// Whether it has surfaces for pictures.
-    pub is_drawn: bool,
-    /// Whether it is the base or a moving link itself, and not bolted to one.
-    pub is_links_own: bool,
-}
-
-/// Beginning of the note on parts that have no shape because the scenario says so.
-pub const WITHOUT_SHAPE: &str = "without a shape, as the scenario says: ";
-
-/// A part of arm or tool that has no collision shape though it is there: nothing is known of its clearance.
+/// A part of arm or tool without collision shape: its clearance is not evaluated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnseenPart {
     /// A link's label, or the name of a link in a URDF.
     pub name: String,
     /// The body that it belongs to: 0 for the base, 1 to 6 for the moving links; none for the tool.
     pub owner: Option<usize>,
-}
-
-/// A calibration that a robot's chain was made from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct AppliedCalibration {
-    /// Its hash, if the file has one.
-    pub hash: Option<String>,
-    /// The file.
-    pub source: ModelSource,
 }
 
 /// The arm, placed in the world.
@@ -81,38 +47,18 @@ pub struct Robot {
     pub base: Link,
     /// The six moving links.
     pub links: [Link; JOINT_COUNT],
-    /// Links of the URDF and what they became part of, in the file's order.
-    pub members: Vec<LinkMember>,
-    /// Parts that have no collision shape, and of which nobody says that they need none.
+    /// Parts without a collision shape that the scenario does not exempt.
     pub unseen: Vec<UnseenPart>,
     /// Mass properties of the moving links, without the tool.
     pub bodies: [Body; JOINT_COUNT],
     /// Limits of the joints.
     pub limits: JointLimits,
-    /// The arm whose data the robot has, if its lengths are known or somebody named it.
-    pub arm: Option<ArmInUse>,
-    /// The URDF.
-    pub source: ModelSource,
-    /// The factory calibration whose joint origins replaced the URDF's, if one was given.
-    pub calibration: Option<AppliedCalibration>,
-    /// The URDF's collision meshes, each once.
-    pub meshes: Vec<ModelSource>,
-    /// What was assumed or replaced while the URDF was read; belongs in every report.
-    pub notes: Vec<String>,
 }
 
 impl Robot {
-    /// What the arm is called: the maker's name where its lengths are those of a known arm, else
-    /// the URDF's.
-    pub fn arm_name(&self) -> String {
-        if let Some(used) = self.arm.as_ref().filter(|used| used.has_its_lengths()) {
-            return used.arm.data.name.clone();
-        }
-        let known = UrGeometry::of_chain(&self.chain)
-            .map(|geometry| UrModel::nearest(&geometry))
-            .ok()
-            .filter(|(_, deviation_m)| *deviation_m <= SAME_ARM_M);
-        known.map_or_else(|| self.name.clone(), |(model, _)| model.name().to_owned())
+    /// Base and moving links.
+    pub fn all_links(&self) -> impl Iterator<Item = &Link> {
+        std::iter::once(&self.base).chain(&self.links)
     }
 
     /// Controller's base frame in `base_link`: turned by 180 degrees about z.
@@ -175,8 +121,6 @@ pub struct Tool {
     pub bore_m: f64,
     /// The needle.
     pub needle: Needle,
-    /// The URDF.
-    pub source: ModelSource,
 }
 
 impl Tool {
@@ -185,142 +129,6 @@ impl Tool {
         (self.flange_from_guide_exit.translation.vector
             - self.flange_from_guide_entry.translation.vector)
             .norm()
-    }
-}
-
-/// What a collision body is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BodyKind {
-    /// The arm's fixed link.
-    Base,
-    /// A moving link of the arm.
-    Link,
-    /// The tool, but for its guide tube.
-    Tool,
-    /// The guide tube.
-    GuideTube,
-    /// Volume behind the guide that needle and hand need; not a physical body.
-    NeedleCorridor,
-    /// The patient: the phantom's skin, head and arms.
-    Phantom,
-    /// CT table.
-    Table,
-    /// CT gantry.
-    Gantry,
-    /// The robot's mount.
-    Mount,
-    /// One of the scenario's obstacles.
-    Obstacle,
-    /// Somebody who stands in the room.
-    Person,
-}
-
-/// What a collision body moves with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Frame {
-    /// Fixed; solids are given in the world.
-    World,
-    /// Moves with moving link 0..6; solids are given in that link's frame.
-    Link(usize),
-}
-
-/// A rigid group of solids.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CollisionBody {
-    /// Unique name: `upper_arm`, `tool`, `guide_tube`, `phantom`, `table` ...
-    pub name: String,
-    /// What it is.
-    pub kind: BodyKind,
-    /// What it moves with.
-    pub frame: Frame,
-    /// Its geometry in that frame.
-    pub solids: Vec<Solid>,
-}
-
-/// Classes of clearance, as reports name them.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum ClearanceClass {
-    /// Moving links against the patient's skin, head and arms included.
-    RobotPhantom,
-    /// Links and tool against the table.
-    RobotTable,
-    /// Links and tool against the gantry.
-    RobotGantry,
-    /// Links and tool against the mount.
-    RobotMount,
-    /// Links and tool against the scenario's obstacles.
-    RobotObstacle,
-    /// Links and tool against the people in the room.
-    RobotPerson,
-    /// The arm and its tool against themselves.
-    #[serde(rename = "self")]
-    SelfCollision,
-    /// The tool, without its guide tube, against the skin.
-    ToolPhantom,
-    /// The guide tube against the skin: the intended stand-off.
-    GuideStandoff,
-    /// The needle's and hand's volume behind the guide against everything it does not belong to.
-    NeedleCorridor,
-    /// The planned needle line against bone, vessel and organ.
-    NeedleRoute,
-}
-
-impl ClearanceClass {
-    /// All of them, in the order of reports; each at the index that it is cast to.
-    pub const ALL: [Self; 11] = [
-        Self::RobotPhantom,
-        Self::RobotTable,
-        Self::RobotGantry,
-        Self::RobotMount,
-        Self::RobotObstacle,
-        Self::RobotPerson,
-        Self::SelfCollision,
-        Self::ToolPhantom,
-        Self::GuideStandoff,
-        Self::NeedleCorridor,
-        Self::NeedleRoute,
-    ];
-
-    /// The class of a name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|class| class.name() == name)
-    }
-
-    /// Name as in reports and scenario files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::RobotPhantom => "robot_phantom",
-            Self::RobotTable => "robot_table",
-            Self::RobotGantry => "robot_gantry",
-            Self::RobotMount => "robot_mount",
-            Self::RobotObstacle => "robot_obstacle",
-            Self::RobotPerson => "robot_person",
-            Self::SelfCollision => "self",
-            Self::ToolPhantom => "tool_phantom",
-            Self::GuideStandoff => "guide_standoff",
-            Self::NeedleCorridor => "needle_corridor",
-            Self::NeedleRoute => "needle_route",
-        }
-    }
-
-    /// Whether touching in this class is a collision of physical bodies.
-    pub fn is_physical(self) -> bool {
-        !matches!(self, Self::NeedleCorridor | Self::NeedleRoute)
-    }
-
-    /// Whether nobody wants these bodies to come near each other: physical ones, but for the guide's
-    /// intended stand-off from the skin.
-    pub fn is_unwanted(self) -> bool {
-        self.is_physical() && self != Self::GuideStandoff
-    }
-
-    /// Whether it is of arm and tool against what stands around them: what is called the clearance.
-    pub fn is_surroundings(self) -> bool {
-        self.is_unwanted() && self != Self::SelfCollision
     }
 }
 
@@ -335,7 +143,7 @@ pub struct BodyPair {
     pub class: ClearanceClass,
 }
 
-/// Everything that the arm works among.
+/// Everything around the arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
     /// The arm.
@@ -479,10 +287,7 @@ impl Cell {
             };
             for other in &bodies {
                 if let PairRule::Measured(class) = pair_rule(&body, other) {
-                    let names = unseen.entry(class).or_default();
-                    if names.last() != Some(&part.name) {
-                        names.push(part.name.clone());
-                    }
+                    unseen.entry(class).or_default().push(part.name.clone());
                 }
             }
         }
@@ -520,7 +325,7 @@ impl Cell {
         self.dynamics_under(&self.gravity_m_s2)
     }
 
-    /// The same under another gravity, world axes, m/s^2: one that a controller believes in.
+    /// The same under another gravity, world axes, m/s^2, such as the controller's.
     pub fn dynamics_under(&self, gravity_m_s2: &Vector3<f64>) -> Dynamics {
         let mut bodies = self.robot.bodies;
         let tool_in_link = self
@@ -555,7 +360,7 @@ impl Cell {
 }
 
 /// Solids in another frame.
-pub(crate) fn placed(solids: &[Solid], new_from_old: &Pose) -> Vec<Solid> {
+pub fn placed(solids: &[Solid], new_from_old: &Pose) -> Vec<Solid> {
     solids
         .iter()
         .map(|solid| Solid {
@@ -568,14 +373,6 @@ pub(crate) fn placed(solids: &[Solid], new_from_old: &Pose) -> Vec<Solid> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_class_is_at_its_index_and_goes_by_its_name() {
-        for (index, class) in ClearanceClass::ALL.into_iter().enumerate() {
-            assert_eq!(class as usize, index);
-            assert_eq!(ClearanceClass::named(class.name()), Some(class));
-        }
-    }
 
     #[test]
     fn the_hand_cone_is_closed_convex_and_contains_the_cone() {

@@ -2,7 +2,7 @@
 
 use needlebench_kinematics::Joints;
 
-/// Twist of each joint's gear under its torque: a line through three slopes, as makers of strain-wave
+/// Twist of each joint's gear under its torque: a line through three slopes, as manufacturers of strain-wave
 /// gears give it.
 ///
 /// ```text
@@ -105,7 +105,7 @@ mod tests {
     /// Rounding of sums of a few terms.
     const ROUNDING: f64 = 1e-15;
 
-    /// Size 17 of a maker's catalogue, ratio 50.
+    /// Size 17 of a manufacturer's catalogue, ratio 50.
     fn size_17() -> GearTwist {
         GearTwist {
             compliance_rad_per_nm: [0.81e4, 1.1e4, 1.3e4].map(|k: f64| Joints::repeat(k.recip())),

@@ -1,6 +1,6 @@
 //! Which pairs of bodies matter, and for which class of clearance.
 
-use crate::model::{BodyKind, ClearanceClass, CollisionBody, Frame};
+use crate::bodies::{BodyKind, ClearanceClass, CollisionBody, Frame};
 
 /// Why the distance of two bodies is not measured: it follows from how the cell is built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
@@ -25,9 +25,9 @@ pub enum PairRule {
 
 /// The rule for two different bodies, in either order.
 ///
-/// Every pair that can move is measured, but for links that share a joint. One that cannot move is
-/// measured too: the needle corridor against wrist 3, since a tool that is bolted on so that the
-/// wrist stands behind its guide shows that as a constant.
+/// Every pair that can move is measured, except links that share a joint. One pair that cannot move is measured too:
+/// the access zone against wrist 3. Its distance is constant, and shows a tool that is mounted so that the wrist is in
+/// the access zone.
 pub fn pair_rule(a: &CollisionBody, b: &CollisionBody) -> PairRule {
     use BodyKind::{
         Base, Gantry, GuideTube, Link, Mount, NeedleCorridor, Obstacle, Person, Phantom, Table,
