@@ -30,7 +30,7 @@ impl Default for Scene {
         Self {
             parts: Vec::new(),
             names: Vec::new(),
-            around_hu: f64::from(crate::AIR_HU),
+            around_hu: f64::from(needlebench_imaging::AIR_HU),
         }
     }
 }

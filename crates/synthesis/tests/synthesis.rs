@@ -7,12 +7,12 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use needlebench_geometry::mesh::SolidMesh;
 use needlebench_geometry::{Shape, Solid, sample_solids};
-use needlebench_imaging::synth::{
-    Kernel, Noise, Overshoot, ScanPreset, Scanner, Scene, SliceProfile, label, synthesise,
-};
 use needlebench_imaging::{ImagingError, Volume, VoxelGrid};
 use needlebench_kinematics::Pose;
-use needlebench_kinematics::normal::probability_below;
+use needlebench_numerics::normal::probability_below;
+use needlebench_synthesis::{
+    Kernel, Noise, Overshoot, ScanPreset, Scanner, Scene, SliceProfile, label, synthesise,
+};
 
 const SEED: u64 = 7;
 /// Of values stored as integers: half of one, and rounding.

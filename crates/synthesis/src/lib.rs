@@ -1,8 +1,8 @@
-//! CT volumes of known scenes: the truth against which everything else is measured.
+//! CT volumes of known scenes: the ground truth against which everything else is measured.
 //!
 //! A [`Scene`] of exact solids is seen by a [`Scanner`], effect by effect:
 //!
-//! 1. the slice's sensitivity over its thickness, which is independent of the distance between slices, and the mean
+//! 1. the slice's sensitivity over its thickness, which is independent of the slice spacing, and the mean
 //!    over cells of a part of a pixel: plane cuts in closed form where one surface crosses a cell, smaller cells where
 //!    several do;
 //! 2. the Gaussian blur in the slice (the mean over cells counts towards it), and the overshoot along edges;
@@ -12,7 +12,7 @@
 //!
 //! The slices may lie anyhow in `ct`, turned or sheared (a tilted gantry); thickness counts along their normal.
 //! The same seed gives the same bytes, whatever the number of threads.
-
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 #![expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -31,9 +31,10 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 
-use crate::in_slices::{in_slices, room_for};
-use crate::{AIR_HU, ImagingError, LabelMap, Volume, VoxelGrid};
 use blur::{Blur, InPlane, blur_pixels, centred_gaussian};
+use needlebench_imaging::{
+    AIR_HU, ImageCircle, ImagingError, LabelMap, Volume, VoxelGrid, in_slices, room_for,
+};
 use noise::{NoiseBuffers, NoiseSource};
 use raster::{Cell, Contents, Raster, Stack};
 pub use scanner::{Kernel, Noise, Overshoot, ScanPreset, Scanner, SliceProfile, Streaks};
@@ -122,34 +123,6 @@ pub fn label(
     })
 }
 
-/// Whether a pixel is outside the circle within an image: columns and rows of the image, and the pixel's.
-pub(crate) fn is_outside_circle([columns, rows]: [usize; 2], [i, j]: [usize; 2]) -> bool {
-    Circle::new([columns, rows]).share(i, j) > 1.0
-}
-
-/// The circle that touches the image's nearer borders.
-#[derive(Debug, Clone, Copy)]
-struct Circle {
-    middle: [f64; 2],
-    radius: f64,
-}
-
-impl Circle {
-    fn new([columns, rows]: [usize; 2]) -> Self {
-        Self {
-            middle: [0.5 * (columns - 1) as f64, 0.5 * (rows - 1) as f64],
-            radius: 0.5 * columns.min(rows) as f64,
-        }
-    }
-
-    /// Square of the distance from the middle, of that of the rim.
-    #[inline]
-    fn share(&self, i: usize, j: usize) -> f64 {
-        let [x, y] = [i as f64 - self.middle[0], j as f64 - self.middle[1]];
-        (x * x + y * y) / (self.radius * self.radius)
-    }
-}
-
 /// How the slices of a grid lie.
 #[derive(Debug)]
 struct SliceFrame<'g> {
@@ -217,7 +190,7 @@ struct Camera<'s> {
     /// Taps of the overshoot's further blur.
     further: Vec<f32>,
     noise: Option<NoiseSource>,
-    circle: Circle,
+    circle: ImageCircle,
 }
 
 impl<'s> Camera<'s> {
@@ -245,7 +218,7 @@ impl<'s> Camera<'s> {
             noise: scanner
                 .noise
                 .map(|noise| NoiseSource::new(&noise, size, pixel_m, slices_m, seed)),
-            circle: Circle::new(size),
+            circle: ImageCircle::new(size),
         }
     }
 }

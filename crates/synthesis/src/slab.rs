@@ -35,7 +35,7 @@ impl Layers {
             SliceProfile::Box => height_m,
             SliceProfile::Bell => {
                 let sigma_m = slice_thickness_m / (8.0 * std::f64::consts::LN_2).sqrt();
-                needlebench_kinematics::normal::probability_below(height_m / sigma_m)
+                needlebench_numerics::normal::probability_below(height_m / sigma_m)
             }
         };
         let from_bottom = |layer: usize| {

@@ -1,6 +1,6 @@
 //! Noise with the spectrum of a kernel, that neighbouring slices share as far as they overlap.
 
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 
 use super::blur::{blur_pixels, centred_gaussian};
 use super::scanner::Noise;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::ImagingError;
+use needlebench_imaging::ImagingError;
 
 /// How the sensitivity of a slice falls off along its normal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -74,7 +74,7 @@ pub struct Scanner {
     pub streaks: Option<Streaks>,
     /// Least and greatest value that is stored, HU.
     pub range_hu: [i16; 2],
-    /// Whether what is outside the circle within the image is not seen. It is air in a [`crate::Volume`].
+    /// Whether what is outside the circle within the image is not seen. It is air in a [`needlebench_imaging::Volume`].
     pub has_circle: bool,
 }
 
@@ -182,14 +182,14 @@ impl Scanner {
             if value.is_finite() && value > 0.0 {
                 return Ok(());
             }
-            let message = format!("{name} is {value} {unit}, and has to be above 0");
+            let message = format!("{name} is {value} {unit}, but must be above 0");
             Err(ImagingError::refused(message))
         };
         let at_least_0 = |name: &str, value: f64, unit: &str| {
             if value.is_finite() && value >= 0.0 {
                 return Ok(());
             }
-            let message = format!("{name} is {value} {unit}, and has to be 0 or more");
+            let message = format!("{name} is {value} {unit}, but must be 0 or more");
             Err(ImagingError::refused(message))
         };
         positive("slice thickness", 1e3 * self.slice_thickness_m, "mm")?;
