@@ -1,8 +1,9 @@
 //! Criteria of a test by ISO 9283.
 
-use needlebench_cell::iso9283::Iso9283Criteria;
 use needlebench_cell::part_in_words;
-use needlebench_cell::scenario::CriteriaSection;
+use needlebench_iso9283::PoseStatistics;
+use needlebench_scenario::iso9283::Iso9283Criteria;
+use needlebench_scenario::scenario::CriteriaSection;
 
 use super::{EngineMeasurement, Iso9283Report};
 use crate::report::{CriterionResult, Judged, NotJudged};
@@ -14,8 +15,7 @@ pub const SUBJECT: &str = "iso9283";
 /// Checks a simulated test against the criteria of its section, and against those of the scenario
 /// that make sense without a goal: torque, contact and the difference of the engines.
 ///
-/// The verdict is `fail` if any is missed, else `incomplete` if one of `engines`, those that were to
-/// measure, did not.
+/// The verdict is `fail` if any fails, else `incomplete` if one of `engines`, those that were to measure, did not.
 pub fn judge(
     report: &Iso9283Report,
     own: &Iso9283Criteria,
@@ -56,7 +56,7 @@ pub fn judge(
         let unmeasured = unmeasured_by(name);
         let missing = Some(unmeasured.as_str());
         let statistics = found.map(|measured| &measured.statistics);
-        let at_worst = |value: fn(&super::PoseStatistics) -> f64| {
+        let at_worst = |value: fn(&PoseStatistics) -> f64| {
             found.map_or(String::new(), |measured| worst(measured, value))
         };
         check(
@@ -136,7 +136,11 @@ pub fn judge(
             "N",
             force_n,
             pair.map_or(String::new(), |[a, b]| {
-                format!("{} touches {}", part_in_words(a), part_in_words(b))
+                format!(
+                    "contact between {} and {}",
+                    part_in_words(a),
+                    part_in_words(b)
+                )
             }),
             missing,
         );
@@ -181,7 +185,7 @@ pub fn judge(
 }
 
 /// The pose at which a value is largest, in words.
-fn worst(measured: &EngineMeasurement, value: fn(&super::PoseStatistics) -> f64) -> String {
+fn worst(measured: &EngineMeasurement, value: fn(&PoseStatistics) -> f64) -> String {
     let poses = measured.statistics.poses.iter();
     poses
         .max_by(|a, b| value(a).total_cmp(&value(b)))

@@ -2,13 +2,12 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use needlebench_cell::Cell;
-use needlebench_cell::iso9283::{Iso9283Protocol, Stop};
 use needlebench_engine::{PlantState, Recording};
+use needlebench_iso9283::{Arrival, Attained, mean_vector};
 use needlebench_kinematics::{Pose, rotation_vector};
+use needlebench_scenario::iso9283::{Iso9283Protocol, Stop};
 use serde::Serialize;
 
-use super::statistics::mean_vector;
-use super::{Arrival, Attained};
 use crate::motion::ContactMeasurement;
 
 /// What one recorded cycle says.

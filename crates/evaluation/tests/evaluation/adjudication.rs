@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use needlebench_cell::envelope::EnvelopeSection;
-use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
 use needlebench_engine::{Contact, Cost, EngineIdentity, PlantState, Recording};
 use needlebench_evaluation::adjudication::{
     Adjudication, Cause, Evidence, JudgedQuantity, PairConvergence, adjudicate, judge_differences,
@@ -15,6 +13,8 @@ use needlebench_evaluation::referee::{
 };
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::JointState;
+use needlebench_scenario::envelope::EnvelopeSection;
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 
 const TIMESTEP_S: f64 = 1e-3;
 const STEPS: u32 = 1000;
@@ -179,7 +179,7 @@ fn difference_that_shrinks_with_the_step_is_the_steps() {
     assert_eq!(ruling.cause, Cause::StepTooLong);
     let words = sentence(peak).unwrap();
     assert!(
-        words.contains("2.000 um at 1.000 ms") && words.contains("order 1.00"),
+        words.contains("2.000 um at step 1.000 ms") && words.contains("order 1.00"),
         "{words}"
     );
 }

@@ -2,7 +2,6 @@
 
 mod adjudication;
 mod compare;
-mod iso9283;
 mod measurements;
 mod ranking;
 mod room;

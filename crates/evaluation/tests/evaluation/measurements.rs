@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use nalgebra::{Translation3, UnitQuaternion, UnitVector3, Vector3};
-use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
 use needlebench_engine::{Contact, Cost, EngineIdentity, PlantState, Recording, Saturation};
 use needlebench_evaluation::{
     LEAST_SHADOW, engine_difference, measure_guide, measure_motion, measure_needle,
@@ -12,6 +11,7 @@ use needlebench_kinematics::trajectory::{
     JointState, JointTrajectory, MotionLimits, Phase, ProfileLimits,
 };
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 
 /// Rounding of lengths below 2 m through half a dozen transforms.
 const ROUNDING: f64 = 1e-13;

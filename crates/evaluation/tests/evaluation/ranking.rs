@@ -2,11 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::ranking::{MetricRanking, RankingSection};
 use needlebench_evaluation::metric::{Metric, metrics};
 use needlebench_evaluation::pareto::{Scale, dominates, pareto_set};
-use needlebench_evaluation::ranking::SAME_SCORE;
-use needlebench_evaluation::ranking::rank_goal;
+use needlebench_evaluation::ranking::{SAME_SCORE, rank_goal};
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, EngineReport, GoalReport, MarginReport,
     MarginsReport, PhaseReport, Status,
@@ -14,6 +12,7 @@ use needlebench_evaluation::report::{
 use needlebench_evaluation::room::RoomReport;
 use needlebench_evaluation::{EngineDifference, MotionMeasurement, NeedleMeasurement};
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::ranking::{MetricRanking, RankingSection};
 use needlebench_uncertainty::budget::{ErrorBudget, Moments, PointBudget, SourceBudget};
 use proptest::prelude::*;
 
@@ -420,11 +419,11 @@ fn more_clearance_is_chosen_and_dominates() {
     assert_eq!(goal.ranking.as_ref().unwrap().pareto_set, ["Right-Up-Fold"]);
     let reason = &goal.recommended.as_ref().unwrap().reason;
     assert!(
-        reason.contains("ahead in clearance (proven 30.0 mm against 20.0 mm"),
+        reason.contains("better in clearance (certified 30.0 mm vs. 20.0 mm"),
         "{reason}"
     );
     // Nothing speaks for the other one.
-    assert!(reason.contains("no change of a single weight"), "{reason}");
+    assert!(reason.contains("no single weight change"), "{reason}");
 }
 
 #[test]
@@ -443,7 +442,7 @@ fn what_the_metrics_do_not_resolve_is_not_told_apart() {
     assert!(
         recommended
             .summary
-            .contains("not told apart from Right-Down-Fold (within what the metrics resolve)"),
+            .contains("tied with Right-Down-Fold (within the metrics' resolution)"),
         "{}",
         recommended.summary
     );
@@ -466,7 +465,7 @@ fn noise_decides_nothing() {
     assert!((scores[0] - scores[1]).abs() < SAME_SCORE);
     assert_eq!(chosen(&goal), "Right-Down-Fold");
     let reason = &goal.recommended.as_ref().unwrap().reason;
-    assert!(reason.contains("the two are even"), "{reason}");
+    assert!(reason.contains("scores are equal"), "{reason}");
 }
 
 #[test]
@@ -517,7 +516,7 @@ fn reason_prints_what_was_measured_and_not_what_counts() {
         assert!(term.utility <= 1.0);
     }
     assert!(
-        reason.contains("(proven 30.0 mm against 20.0 mm"),
+        reason.contains("(certified 30.0 mm vs. 20.0 mm"),
         "{reason}"
     );
 }
@@ -595,7 +594,10 @@ fn only_what_works_is_ranked() {
     let goal = ranked(vec![rejected, failed, configuration(2)]);
     assert_eq!(chosen(&goal), "Right-Down-Unfold");
     let reason = &goal.recommended.as_ref().unwrap().reason;
-    assert!(reason.starts_with("the only one that works"), "{reason}");
+    assert!(
+        reason.starts_with("the only feasible configuration"),
+        "{reason}"
+    );
     for each in &goal.configurations[..2] {
         assert!(!each.pareto && each.ranking.is_none() && each.dominated_by.is_none());
     }
@@ -621,7 +623,7 @@ fn nothing_measured_is_said_and_not_scored() {
             .all(|each| each.ranking.is_none())
     );
     let reason = &goal.recommended.as_ref().unwrap().reason;
-    assert!(reason.contains("nothing that has a weight"), "{reason}");
+    assert!(reason.contains("no metric with a weight"), "{reason}");
 }
 
 /// Resolution of all metrics below: above the noise, below the grid.

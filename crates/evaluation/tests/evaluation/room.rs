@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::{BodyKind, Cell, CollisionBody, Frame, Overrides, ResolvedScenario};
+use needlebench_cell::{BodyKind, Cell, CollisionBody, Frame};
 use needlebench_evaluation::room::{
     CONE_TOLERANCE_RAD, ENTRY_DISC_HEIGHT_M, Obstacles, RoomModel, Sector, SightTargets, hand_cone,
     measure_sight,
@@ -12,10 +12,11 @@ use needlebench_evaluation::room::{
 use needlebench_geometry::{Shape, Solid};
 use needlebench_kinematics::ik::{Configuration, Elbow};
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_scenario::{Overrides, ResolvedScenario};
 
 fn table3() -> ResolvedScenario {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/table3.toml");
-    needlebench_cell::load_scenario(&path, &Overrides::default()).expect("a shipped scenario")
+    needlebench_scenario::load_scenario(&path, &Overrides::default()).expect("a shipped scenario")
 }
 
 /// A cell with one fixed body in place of everything else; `kind` says whether it counts as robot.

@@ -3,9 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use needlebench_cell::scenario::{ClearanceCriteria, CriteriaSection};
-use needlebench_cell::study::StudyMode;
-use needlebench_cell::{Expectation, Goal, Overrides, load_scenario};
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, GoalReport, MarginsReport,
     RejectionReport, Status, Verdict,
@@ -14,6 +11,9 @@ use needlebench_evaluation::{
     NeedleMeasurement, check_configuration, first_missed_by_posture, judge,
 };
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::scenario::{ClearanceCriteria, CriteriaSection};
+use needlebench_scenario::study::StudyMode;
+use needlebench_scenario::{Expectation, Goal, Overrides, load_scenario};
 
 /// Configuration `index` with a least clearance to the skin and a joint margin, not yet judged.
 fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationReport {

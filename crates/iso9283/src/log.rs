@@ -5,14 +5,14 @@
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 
 use super::columns::Columns;
 use super::log_units::LogUnits;
 use super::table::Table;
 use super::{Attained, Commanded};
 
-/// Findings of a file beyond this many help nobody.
+/// Most findings of a file that are reported.
 const MOST_FINDINGS: usize = 20;
 
 /// What a log says.
@@ -102,7 +102,7 @@ pub fn read_commanded(
                 findings.push(
                     table
                         .finding(row, column, message)
-                        .hint("one row per pose; measurements belong into --csv"),
+                        .hint("give one row per pose; measurements belong in --csv"),
                 );
             }
             Ok(parsed) => commanded.push(parsed.commanded),
@@ -111,7 +111,7 @@ pub fn read_commanded(
     }
     findings.truncate(MOST_FINDINGS);
     if commanded.is_empty() && findings.is_empty() {
-        findings.push(Finding::new(file, "there is no pose in it").hint("one row per pose"));
+        findings.push(Finding::new(file, "the file has no pose").hint("give one row per pose"));
     }
     if findings.is_empty() {
         Ok(commanded)
@@ -123,11 +123,11 @@ pub fn read_commanded(
 fn twice(table: &Table<'_>, row: usize, earlier: usize, columns: &Columns, cycle: u32) -> Finding {
     let column = columns.pose_column();
     let message = format!(
-        "{} of cycle {cycle} was measured in line {} already",
+        "{} of cycle {cycle} was already measured in line {}",
         table.cell(row, column),
         table.line(earlier)
     );
     table
         .finding(row, column, message)
-        .hint("one row per pose and cycle: average the readings of one stand before")
+        .hint("give one row per pose and cycle; average the readings of one visit beforehand")
 }

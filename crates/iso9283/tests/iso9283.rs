@@ -1,18 +1,18 @@
 //! ISO 9283: statistics against NumPy's, logs of trackers in and out, and what is wrong with them.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use needlebench_cell::Finding;
-use needlebench_evaluation::iso9283::{
+use needlebench_input::Finding;
+use needlebench_iso9283::{
     Attained, Commanded, LogUnits, MeasuredReport, RotationColumns, StatisticsError, drift,
     evaluate, measured_report, read_commanded, read_log, write_commanded, write_log,
 };
 use needlebench_kinematics::Pose;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use serde_json::Value;
 
-const LOG: &str = include_str!("iso9283/log.csv");
-const COMMANDED: &str = include_str!("iso9283/commanded.csv");
-const REFERENCE: &str = include_str!("iso9283/reference.json");
+const LOG: &str = include_str!("data/log.csv");
+const COMMANDED: &str = include_str!("data/commanded.csv");
+const REFERENCE: &str = include_str!("data/reference.json");
 
 /// Difference from NumPy, mm: rounding of coordinates of 300 mm.
 const POSITION_MM: f64 = 1e-11;
@@ -194,7 +194,7 @@ fn a_tracker_s_own_frame_is_fitted() {
 
 fn report(
     commanded: &[Commanded],
-    log: needlebench_evaluation::iso9283::TrackerLog,
+    log: needlebench_iso9283::TrackerLog,
     fit_frame: bool,
 ) -> MeasuredReport {
     measured_report("log", "commanded", commanded, log, fit_frame)
@@ -281,41 +281,41 @@ fn what_is_wrong_is_named_with_line_and_place() {
             3,
             "",
             "the value is missing",
-            "leave out",
+            "omit",
         ),
         (
             format!("{HEADER}2,P1,1,2..5,3\n"),
             3,
             "2..5",
             "`2..5` is not a number",
-            "leave out",
+            "omit",
         ),
         (
             format!("{HEADER}2,P7,1,2,3\n"),
             3,
             "P7",
-            "none of the commanded",
+            "not a commanded pose",
             "P1, P2, P3, P4, P5",
         ),
         (
             format!("{HEADER}2,home,1,2,3\n"),
             3,
             "home",
-            "is no pose",
+            "is not a pose",
             "P1 to P5",
         ),
         (
             format!("{HEADER}0,P1,1,2,3\n"),
             3,
             "0",
-            "no number of a cycle",
-            "counted 1, 2, 3",
+            "is not a cycle number",
+            "numbered 1, 2, 3",
         ),
         (
             format!("{HEADER}1,P1,1,2,3\n"),
             3,
             "P1",
-            "measured in line 2 already",
+            "already measured in line 2",
             "average",
         ),
         (
@@ -330,7 +330,7 @@ fn what_is_wrong_is_named_with_line_and_place() {
             3,
             "2,P1,1,2",
             "has 4 values",
-            "cut off",
+            "truncated",
         ),
         (
             format!("{HEADER}2,P1,1,2,3,4\n3,P1,1,2,3\n"),
@@ -351,20 +351,20 @@ fn what_is_wrong_is_named_with_line_and_place() {
             1,
             "pose,x_mm,y_mm,zz_mm",
             "no column `z_mm`",
-            "is it `zz_mm`?",
+            "did you mean `zz_mm`?",
         ),
         (
             "pose,x,y_mm,z_mm\nP1,1,2,3\n".into(),
             1,
             "x",
-            "does not say its unit",
+            "does not state its unit",
             "--length-unit",
         ),
         (
             "pose,x [ft],y_mm,z_mm\nP1,1,2,3\n".into(),
             1,
             "x [ft]",
-            "`ft` is no unit of length",
+            "`ft` is not a unit of length",
             "m, mm, um or in",
         ),
         (
@@ -378,14 +378,14 @@ fn what_is_wrong_is_named_with_line_and_place() {
             "1, 2296.4, -2416.2, -442.5\n".into(),
             1,
             "1, 2296.4, -2416.2, -442.5",
-            "numbers instead of names",
+            "numbers instead of column names",
             "names the columns",
         ),
         (
             "pose,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\n".into(),
             1,
             "rx_deg",
-            "may mean different things",
+            "are ambiguous",
             "--rotation",
         ),
         (
@@ -399,7 +399,7 @@ fn what_is_wrong_is_named_with_line_and_place() {
             format!("{}1,P1,w,1,2,3\n", "cycle,pose,direction,x_mm,y_mm,z_mm\n"),
             2,
             "w",
-            "no approach direction",
+            "is not an approach direction",
             "x, y or z",
         ),
     ] {
@@ -413,7 +413,11 @@ fn what_is_wrong_is_named_with_line_and_place() {
     let (finding, _) = refused("# nothing\n");
     assert!(finding.message.contains("no header"));
     let (finding, _) = refused("pose,x_mm,y_mm,z_mm,qw,qx\n");
-    assert!(finding.message.contains("qw, qx, qy, qz are not all there"));
+    assert!(
+        finding
+            .message
+            .contains("not all columns qw, qx, qy, qz are present")
+    );
 }
 
 #[test]
@@ -439,7 +443,7 @@ fn too_few_cycles_are_no_spread() {
     let error = evaluate(&commanded, &attained).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "P2 was measured 1 times along x; a spread needs at least two"
+        "P2 was measured 1 times along x; repeatability requires at least two"
     );
     assert_eq!(
         evaluate(&commanded, &[]),

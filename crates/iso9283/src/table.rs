@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use needlebench_cell::{Finding, Separator};
+use needlebench_input::{Finding, Separator};
 
 use super::log_units::is_unit;
 
@@ -54,12 +54,9 @@ impl<'a> Table<'a> {
             .all(|each| text[each.span.clone()].parse::<f64>().is_ok() || each.span.is_empty())
         {
             return Err(vec![
-                Finding::new(
-                    file,
-                    "the first line has numbers instead of names of columns",
-                )
-                .at(text, header)
-                .hint(HEADER_HINT),
+                Finding::new(file, "the first line has numbers instead of column names")
+                    .at(text, header)
+                    .hint(HEADER_HINT),
             ]);
         }
         let (mut rows, mut findings) = (Vec::new(), Vec::new());
@@ -81,10 +78,10 @@ impl<'a> Table<'a> {
             );
             let cut_off = lines.peek().is_none() && found.len() < headings.len();
             findings.push(Finding::new(file, message).at(text, line).hint(if cut_off {
-                "it is the last line: the file looks cut off; copy it again, or remove the line"
+                "this is the last line, the file may be truncated; copy it again or remove the line"
             } else {
-                "every line needs a value for every column; numbers with a decimal comma need a \
-                 semicolon between them"
+                "every line requires a value for every column; numbers with a decimal comma \
+                 require a semicolon as separator"
             }));
         }
         if findings.is_empty() {
@@ -134,8 +131,8 @@ impl<'a> Table<'a> {
     }
 }
 
-pub(super) const HEADER_HINT: &str = "the first line that is no comment names the columns and their \
-     units, such as: time_s,cycle,pose,direction,x_mm,y_mm,z_mm,qw,qx,qy,qz";
+pub(super) const HEADER_HINT: &str = "the first line that is not a comment names the columns and their units, e.g.: \
+     time_s,cycle,pose,direction,x_mm,y_mm,z_mm,qw,qx,qy,qz";
 
 /// Lines that are neither empty nor comments, without line ends.
 fn lines(text: &str) -> impl Iterator<Item = Range<usize>> {

@@ -49,7 +49,7 @@ pub(super) fn parse_shifted(text: &str, places: i32) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     use super::*;
 

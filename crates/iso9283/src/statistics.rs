@@ -16,7 +16,7 @@ pub enum StatisticsError {
         pose: u32,
     },
     /// Too few measurements for a spread.
-    #[error("P{pose} was measured {count} times{direction}; a spread needs at least two")]
+    #[error("P{pose} was measured {count} times{direction}; repeatability requires at least two")]
     TooFew {
         /// Number of the pose.
         pose: u32,
@@ -259,8 +259,8 @@ fn mean_position(attained: &[&Attained]) -> Point3<f64> {
     first + mean_vector(&offsets)
 }
 
-/// Mean relative to the first, so that the mean of equal vectors is that vector, exactly.
-pub(super) fn mean_vector(vectors: &[Vector3<f64>]) -> Vector3<f64> {
+/// Mean of vectors, at least one, relative to the first, so that the mean of equal vectors is that vector exactly.
+pub fn mean_vector(vectors: &[Vector3<f64>]) -> Vector3<f64> {
     let first = vectors[0];
     let sum: Vector3<f64> = vectors.iter().map(|each| each - first).sum();
     first + sum / vectors.len() as f64

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
-use needlebench_cell::{Finding, nearest_name};
+use needlebench_input::{Finding, nearest_name};
 
 use super::Commanded;
 use super::log_units::{Dimension, LogUnits, RotationColumns, to_si};
@@ -156,10 +156,10 @@ impl Columns {
             (&rotation[..], "rx, ry, rz"),
         ] {
             if !matches!(whole(roles), 0) && whole(roles) != roles.len() {
-                let message = format!("the columns {what} are not all there");
+                let message = format!("not all columns {what} are present");
                 findings.push(
                     Finding::new(table.file, message)
-                        .hint("an orientation needs all of them; remove the others to go without"),
+                        .hint("an orientation requires all of them; remove the others to omit it"),
                 );
             }
         }
@@ -171,10 +171,10 @@ impl Columns {
             if units.rotation.is_none() {
                 findings.push(
                     table
-                        .column_finding(column, "rx, ry, rz may mean different things".to_owned())
+                        .column_finding(column, "rx, ry, rz are ambiguous".to_owned())
                         .hint(
-                            "--rotation rotation-vector (as a UR controller shows poses) or \
-                             --rotation fixed-xyz (as SpatialAnalyzer shows frames)",
+                            "use --rotation rotation-vector (as UR controllers display poses) or \
+                             --rotation fixed-xyz (as SpatialAnalyzer displays frames)",
                         ),
                 );
             }
@@ -192,8 +192,7 @@ impl Columns {
         }
         if is_log && !of.contains_key(&Role::Cycle) {
             notes.push(format!(
-                "{}: no column for cycles: they are taken from the names of points (P3_07), or \
-                 counted",
+                "{}: no cycle column; cycles are taken from point names (P3_07) or counted",
                 table.file
             ));
         }
@@ -250,17 +249,13 @@ impl Columns {
         };
         let Some((pose, cycle)) = pose_name(text) else {
             return Err(table
-                .finding(row, column, format!("`{text}` is no pose"))
-                .hint("P1 to P5, or 1 to 5; P3_07 for pose 3 in cycle 7"));
+                .finding(row, column, format!("`{text}` is not a pose"))
+                .hint("use P1 to P5, or 1 to 5; P3_07 for pose 3 in cycle 7"));
         };
         if !commanded.is_empty() && commanded.iter().all(|each| each.pose != pose) {
             return Err(table
-                .finding(
-                    row,
-                    column,
-                    format!("`{text}` is none of the commanded poses"),
-                )
-                .hint(format!("commanded are {}", known())));
+                .finding(row, column, format!("`{text}` is not a commanded pose"))
+                .hint(format!("commanded poses are {}", known())));
         }
         Ok((pose, cycle))
     }
@@ -275,7 +270,7 @@ impl Columns {
         } else {
             Err(table
                 .finding(row, column, format!("{text} would be {value_m:.0} m"))
-                .hint("is the unit in the header the right one?"))
+                .hint("check the unit in the header"))
         }
     }
 
@@ -289,8 +284,15 @@ impl Columns {
             "y" | "Y" | "2" => Ok(Some(1)),
             "z" | "Z" | "3" => Ok(Some(2)),
             other => Err(table
-                .finding(row, column, format!("`{other}` is no approach direction"))
-                .hint("x, y or z (1, 2 or 3); empty for the plain sequence of poses")),
+                .finding(
+                    row,
+                    column,
+                    format!("`{other}` is not an approach direction"),
+                )
+                .hint(
+                    "use x, y or z (1, 2 or 3), or leave empty for the pose sequence without \
+                     directions",
+                )),
         }
     }
 
@@ -314,7 +316,7 @@ impl Columns {
                 let message = format!("the quaternion has norm {:.4} instead of 1", q.norm());
                 return Err(table
                     .finding(row, column, message)
-                    .hint("columns are qw, qx, qy, qz: are they in another order?"));
+                    .hint("columns must be qw, qx, qy, qz; check their order"));
             }
             return Ok(Some(if defect <= QUATERNION_ROUNDING {
                 UnitQuaternion::new_unchecked(q)
@@ -361,7 +363,7 @@ impl Columns {
             .count();
         if unread > 0 {
             notes.push(format!(
-                "{}: {unread} time stamps are not understood and not used: give seconds in a \
+                "{}: {unread} time stamps cannot be parsed and are ignored; give seconds in a \
                  column `time_s`, or dates like 2026-01-31T12:00:00",
                 table.file
             ));
@@ -405,7 +407,7 @@ fn missing(table: &Table<'_>, name: &str, ignored: &[String]) -> Finding {
             table.headings[0].span.start..table.headings[table.headings.len() - 1].span.end,
         )
         .hint(match near {
-            Some(near) => format!("is it `{near}`? {HEADER_HINT}"),
+            Some(near) => format!("did you mean `{near}`? {HEADER_HINT}"),
             None => HEADER_HINT.to_owned(),
         })
 }
@@ -425,14 +427,17 @@ fn unit_of(
     };
     let Some(unit) = heading.unit.as_deref().or(given) else {
         return Err(table
-            .column_finding(column, format!("`{name}` does not say its unit"))
+            .column_finding(column, format!("`{name}` does not state its unit"))
             .hint(format!(
                 "write it as `{name}_{usual}`, or give --{what}-unit {usual}"
             )));
     };
     to_si(unit, of).ok_or_else(|| {
         table
-            .column_finding(column, format!("`{unit}` is no unit of {what} in `{name}`"))
+            .column_finding(
+                column,
+                format!("`{unit}` is not a unit of {what} in `{name}`"),
+            )
             .hint(units)
     })
 }
@@ -448,7 +453,7 @@ fn finite(table: &Table<'_>, row: usize, column: usize) -> Result<String, Findin
     };
     Err(table
         .finding(row, column, message)
-        .hint("leave out the whole line if the tracker lost the target"))
+        .hint("omit the whole line if the tracker lost the target"))
 }
 
 fn whole_number(table: &Table<'_>, row: usize, column: usize) -> Result<u32, Finding> {
@@ -458,7 +463,7 @@ fn whole_number(table: &Table<'_>, row: usize, column: usize) -> Result<u32, Fin
         .filter(|number| *number > 0)
         .ok_or_else(|| {
             table
-                .finding(row, column, format!("`{text}` is no number of a cycle"))
-                .hint("cycles are counted 1, 2, 3 ...")
+                .finding(row, column, format!("`{text}` is not a cycle number"))
+                .hint("cycles are numbered 1, 2, 3 ...")
         })
 }
