@@ -1,20 +1,20 @@
-//! What the best choice is searched by: the section `[search]` of a study file.
+//! Optimisation of the control factors: the section `[search]` of a study file.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::ClearanceClass;
+use needlebench_cell::ClearanceClass;
 
-/// What choices are compared by.
+/// Objective by which candidates are compared.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ObjectiveName {
-    /// A lower quantile of the signed margin: how much room the worst layouts leave.
+    /// A lower quantile of the constraint margin over the layouts.
     #[default]
     Margin,
-    /// The share of layouts in which a configuration works.
+    /// Share of layouts with a feasible configuration.
     Rate,
-    /// The mean of the expected error of the tip.
+    /// Mean over the layouts of the RMS tip error.
     TipError,
 }
 
@@ -29,34 +29,34 @@ impl ObjectiveName {
     }
 }
 
-/// What `needlebench search` looks for among the factors with `role = "choice"`: static cases, and layouts that
-/// are sampled from all other factors, goals included.
+/// Optimisation by `needlebench search` over the control factors (`role = "choice"`). Cases are static; layouts are
+/// sampled from all other factors, goals included.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SearchSection {
-    /// `margin`, `rate` or `tip_error`.
+    /// Objective: `margin`, `rate` or `tip_error`.
     pub objective: ObjectiveName,
-    /// Another objective: the answer is then what cannot be improved in one without loss in the other.
+    /// Second objective: the result is then the Pareto set. Default: none.
     pub second_objective: Option<ObjectiveName>,
-    /// Classes of clearance whose room counts in the margin, such as `["robot_phantom", "robot_table"]`. Others count
-    /// where they are broken. If left out: all of arm and tool against what stands around them but `tool_phantom`, which
-    /// the stand-off decides, and `needle_corridor`.
+    /// Clearance classes that count in full in the constraint margin, such as `["robot_phantom", "robot_table"]`;
+    /// others count only where violated. Default: `needle_corridor`, and all classes of arm and tool against their
+    /// surroundings except `tool_phantom`, which the stand-off decides.
     #[schemars(length(min = 1))]
     pub classes: Option<Vec<ClearanceClass>>,
-    /// Share of layouts that may have less than the margin that is compared.
+    /// Quantile of the constraint margin: share of layouts that may have less.
     #[schemars(range(min = 0.001, max = 0.5), extend("x-hint" = "it is a share: 5 % are 0.05"))]
     pub quantile: f64,
-    /// Layouts for each of the last candidates; those of `[sampling]` if left out, else 128.
+    /// Number of layouts for each finalist. Default: that of `[sampling]`, else 128.
     #[schemars(range(min = 16, max = 1_000_000))]
     pub samples: Option<u64>,
-    /// Layouts that no candidate was compared by, on which the winner is judged.
+    /// Number of held-out layouts, not used for selection, on which the winner is evaluated.
     #[schemars(range(min = 16, max = 1_000_000))]
     pub fresh: u64,
-    /// Most cases of the search. If left out: a third of those of all choices with all layouts, and 6144 if choices
-    /// have ranges; the least that is enough where that is more.
+    /// Maximum number of cases. Default: a third of an exhaustive evaluation of all candidates on all layouts, or 6144
+    /// if control factors have ranges; at least the minimum that suffices.
     #[schemars(range(min = 1, max = 1_000_000_000))]
     pub budget: Option<u64>,
-    /// What a layout in which nothing works counts in `tip_error`, mm.
+    /// Failure penalty: tip error assigned to a layout without a feasible configuration in `tip_error`, mm.
     #[schemars(range(max = 1000.0), extend("exclusiveMinimum" = 0.0))]
     pub failure_counts_mm: f64,
 }
@@ -77,7 +77,7 @@ impl Default for SearchSection {
 }
 
 impl SearchSection {
-    /// Whether the room of a class counts in the margin.
+    /// Whether a class counts in the constraint margin in full.
     pub fn counts(&self, class: ClearanceClass) -> bool {
         match &self.classes {
             Some(classes) => classes.contains(&class),

@@ -1,13 +1,13 @@
-//! The text of a scenario that makes a run which excites every joint in another scenario's cell.
+//! The text of a scenario for an excitation run in another scenario's cell.
 
 use std::fmt::Write;
 use std::path::Path;
 
+use needlebench_input::{Finding, TomlText};
 use toml::{Table, Value};
 
+use crate::Overrides;
 use crate::scenario::ExcitationSection;
-use crate::toml_text::TomlText;
-use crate::{Finding, Overrides};
 
 /// What such a run does not have, or does not use.
 const LEFT_OUT: [&str; 8] = [
@@ -50,7 +50,7 @@ impl ExcitationText {
         TomlText::parse(file, text)?;
         let mut table: Table = text
             .parse()
-            .map_err(|error| Finding::new(file, format!("this is no TOML: {error}")))?;
+            .map_err(|error| Finding::new(file, format!("not TOML: {error}")))?;
         let kept = table.get("criteria").and_then(Value::as_table).map(|all| {
             let of_use = all
                 .iter()

@@ -1,5 +1,7 @@
 //! The phantom of one layout, moved about.
 
+use needlebench_input::Finding;
+use needlebench_input::schema::{Node, Path};
 use toml::Value;
 
 use super::ScenarioFamily;
@@ -7,8 +9,7 @@ use super::key_path::{KeyPath, section};
 use super::setting::Change;
 use crate::resolve::StillLayout;
 use crate::scenario::PhantomSection;
-use crate::schema::{Node, Path};
-use crate::{Finding, Goal, PlacedPhantom, ResolvedScenario};
+use crate::{Goal, PlacedPhantom, ResolvedScenario};
 
 /// Keys that a shift adds to.
 pub const SHIFT_KEYS: [&str; 3] = [
@@ -82,19 +83,22 @@ pub struct MovedPhantom {
 
 /// One layout of a family of which the phantom alone is moved.
 ///
-/// What it says of a place is what [`ScenarioFamily::vary`] says, bit for bit; what stays where it is is not
-/// looked at again.
+/// What it says of a place is what [`ScenarioFamily::vary`] says, bit for bit, but that an entry that the scenario leaves
+/// open stays as it was chosen; what stays where it is is not looked at again.
 #[derive(Debug)]
 pub struct PhantomMoves<'f> {
     family: &'f ScenarioFamily,
     goal: &'f str,
     changes: &'f [(KeyPath, Change)],
+    /// Of a goal that the scenario leaves open, deg.
+    entry: Option<[f64; 2]>,
     still: StillLayout,
     ranges: Ranges,
 }
 
 impl ScenarioFamily {
-    /// A layout as [`ScenarioFamily::vary`] makes it, its phantom ready to be moved.
+    /// A layout as [`ScenarioFamily::vary`] makes it, its phantom ready to be moved. An entry that was planned or proposed
+    /// goes with the patient, and is not sought anew.
     ///
     /// # Errors
     /// As [`ScenarioFamily::vary`], and for a layout without a phantom.
@@ -103,7 +107,10 @@ impl ScenarioFamily {
         goal: &'f str,
         changes: &'f [(KeyPath, Change)],
     ) -> Result<PhantomMoves<'f>, Vec<Finding>> {
-        let resolved = self.vary(goal, changes)?;
+        let (resolved, chosen) = self.varied(goal, changes, None)?;
+        let section = resolved.scenario.goals.first();
+        let section = section.filter(|_| !chosen.is_empty());
+        let entry = section.and_then(|section| section.entry_direction_deg);
         let file = resolved.source.file.clone();
         let ranges = Ranges::new().map_err(|why| vec![Finding::new(&file, why)])?;
         let still = StillLayout::new(resolved, &self.folder, &self.library)?;
@@ -115,6 +122,7 @@ impl ScenarioFamily {
             family: self,
             goal,
             changes,
+            entry,
             still,
             ranges,
         })
@@ -167,7 +175,8 @@ impl PhantomMoves<'_> {
     pub fn resolved(&self, by: &PhantomMove) -> Result<ResolvedScenario, Vec<Finding>> {
         let mut changes = self.changes.to_vec();
         changes.extend(by.changes());
-        self.family.vary(self.goal, &changes)
+        let (resolved, _) = self.family.varied(self.goal, &changes, self.entry)?;
+        Ok(resolved)
     }
 }
 

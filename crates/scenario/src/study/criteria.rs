@@ -1,4 +1,4 @@
-//! What a study has to show: the section `[criteria]` of a study file.
+//! Criteria of a study: the section `[criteria]` of a study file.
 
 use std::collections::BTreeMap;
 
@@ -6,84 +6,80 @@ use needlebench_kinematics::ik::Configuration;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
-use crate::limit::Limit;
+use needlebench_input::Limit;
 
-/// Every configuration by itself, in `of` and in `min_success_rate`.
+/// Every configuration individually, in `of` and in `min_success_rate`.
 pub const EVERY: &str = "every";
 
 /// The best configuration of each layout, in `of`.
 pub const BEST: &str = "best";
 
-/// What a study has to show. A layout is a case, with its goal; layouts that cannot exist count in
-/// `max_invalid_layouts` alone.
+/// Criteria of a study. A layout is a case with its goal. Invalid layouts count in `max_invalid_layouts` only.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StudyCriteria {
-    /// Judges the unfavourable end of each 95 % confidence interval instead of the estimate: passes
-    /// where the sample is large enough to show it. Default false.
+    /// Evaluates the unfavourable bound of each 95 % CI instead of the estimate: passes only if the sample is large
+    /// enough. Default false.
     pub confidence: bool,
-    /// Configurations that have to be ok in a layout for it to work, 1 to 8. Default 1.
+    /// Number of configurations that must be ok for a layout to be feasible, 1 to 8. Default 1.
     #[schemars(range(min = 1, max = 8), extend("x-hint" = "an arm of six joints has eight configurations"))]
     pub working_configurations: Option<u32>,
-    /// Least share of the valid layouts that work, 0 to 1.
+    /// Minimum share of feasible layouts among the valid ones, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0), extend("x-hint" = "it is a share: 95 % are 0.95"))]
     pub min_layouts_working: Option<f64>,
-    /// Least share of the valid layouts in which a configuration is ok, 0 to 1, by its label, such as
-    /// `Right-Up-Fold`; `every` is for each that is not named.
+    /// Minimum success rate of a configuration: share of the valid layouts in which it is ok, 0 to 1, by its label,
+    /// such as `Right-Up-Fold`; `every` stands for each that is not named.
     #[schemars(schema_with = "shares")]
     pub min_success_rate: BTreeMap<String, f64>,
-    /// Largest share of the cases whose layout cannot exist, 0 to 1.
+    /// Maximum share of cases with an invalid layout, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0), extend("x-hint" = "it is a share: 95 % are 0.95"))]
     pub max_invalid_layouts: Option<f64>,
-    /// Least clearance, mm: the nearest approach along the simulated motion; of planned cases along
-    /// the planned one, of static cases in their posture.
+    /// Minimum clearance, mm: along the simulated motion; of planned cases along the planned motion, of static cases in
+    /// the final posture.
     pub min_clearance_mm: Option<LowerQuantile>,
-    /// Least certified clearance over the whole motion, mm; planned and dynamic studies.
+    /// Minimum certified clearance over the whole motion, mm; planned and dynamic studies only.
     pub min_certified_clearance_mm: Option<LowerQuantile>,
-    /// Least clearance of arm and tool from themselves, mm.
+    /// Minimum self-clearance of arm and tool, mm.
     pub min_self_mm: Option<LowerQuantile>,
-    /// Largest tip error, mm: simulated, of planned and static cases as the balance of torques
-    /// predicts it.
+    /// Maximum tip error, mm: simulated; of planned and static cases predicted by static equilibrium.
     pub max_tip_error_mm: Option<UpperQuantile>,
-    /// Largest part of the tip error across the needle, mm.
+    /// Maximum lateral tip error, mm.
     pub max_tip_lateral_mm: Option<UpperQuantile>,
-    /// Largest root mean square tip error over the draws of `[imperfections]`, mm.
+    /// Maximum RMS tip error over the arm and patient population (of `[imperfections]`, else of `[expected]`), mm.
     pub max_tip_rms_mm: Option<UpperQuantile>,
 }
 
-/// A quantile that has to be large enough.
+/// A lower limit on a quantile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LowerQuantile {
-    /// Share of the values that may be less, 0 to 1. Default 0.05.
+    /// Quantile: share of the values that may be lower, 0 to 1. Default 0.05 (P5).
     #[serde(default = "low_quantile")]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-hint" = "it is a share: 95 % are 0.95"))]
     pub quantile: f64,
     /// Limit, in the unit of the criterion.
     #[schemars(range(min = -1e12, max = 1e12))]
     pub at_least: f64,
-    /// `best`, the configuration with the largest clearance in each layout that works; `every`, each
-    /// configuration over the layouts in which it is not rejected; or a configuration's label.
-    /// Default `best`.
+    /// Configurations: `best`, the one with the largest clearance in each feasible layout; `every`, each configuration
+    /// over the layouts in which it is not rejected; or a configuration's label. Default `best`.
     #[serde(default = "best")]
     #[schemars(schema_with = "configurations")]
     pub of: String,
 }
 
-/// A quantile that has to be small enough.
+/// An upper limit on a quantile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UpperQuantile {
-    /// Share of the values that may not be more, 0 to 1. Default 0.95.
+    /// Quantile: share of the values that must not exceed the limit, 0 to 1. Default 0.95 (P95).
     #[serde(default = "high_quantile")]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-hint" = "it is a share: 95 % are 0.95"))]
     pub quantile: f64,
     /// Limit, in the unit of the criterion.
     #[schemars(range(min = -1e12, max = 1e12))]
     pub at_most: f64,
-    /// `best`, the configuration with the largest clearance in each layout that works; `every`, each
-    /// configuration over the layouts in which it is not rejected; or a configuration's label.
-    /// Default `best`.
+    /// Configurations: `best`, the one with the largest clearance in each feasible layout; `every`, each configuration
+    /// over the layouts in which it is not rejected; or a configuration's label. Default `best`.
     #[serde(default = "best")]
     #[schemars(schema_with = "configurations")]
     pub of: String,
@@ -108,7 +104,7 @@ pub struct QuantileCriterion<'a> {
     pub key: &'static str,
     /// Share, 0 to 1.
     pub quantile: f64,
-    /// What the quantile has to keep, in the unit of the key.
+    /// Limit of the quantile, in the unit of the key.
     pub limit: Limit,
     /// A label, [`BEST`] or [`EVERY`].
     pub of: &'a str,
@@ -180,9 +176,8 @@ fn configurations(_: &mut SchemaGenerator) -> Schema {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Finding;
-    use crate::schema::FileSchema;
-    use crate::toml_text::TomlText;
+    use needlebench_input::schema::FileSchema;
+    use needlebench_input::{Finding, TomlText};
 
     #[derive(Debug, Deserialize, JsonSchema)]
     struct File {
@@ -240,7 +235,7 @@ mod tests {
                 "[criteria]\nmin_clearance_mm = { at_least = 1, of = \"worst\" }",
                 2,
                 [
-                    "`worst` is not a value that `criteria.min_clearance_mm.of` can have",
+                    "`worst` is not a valid value of `criteria.min_clearance_mm.of`",
                     "hint",
                 ],
             ),

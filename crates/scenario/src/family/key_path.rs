@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::scenario;
-use crate::schema::{Node, unit_of};
+use needlebench_input::schema::{Node, unit_of};
 
 /// Name of the case's goal in paths.
 const GOAL: &str = "goal";

@@ -7,11 +7,10 @@ use super::{
     Distribution, FILE, FactorSection, FactorValues, GridSection, MOST_PLANNED_BY_DEFAULT,
     NormalSection, ResolvedStudy, Role, StudyFactor, StudyFile, StudyLevel, StudyMode,
 };
+use crate::Overrides;
 use crate::engine_name::{EngineName, check_engine_names};
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
-use crate::files::source_of;
-use crate::toml_text::TomlText;
-use crate::{Finding, Overrides, nearest_name};
+use needlebench_input::{Finding, TomlText, nearest_name, source_of};
 
 /// Standard deviations from the mean beyond which quantiles of a truncated distribution lose digits.
 const FARTHEST_SD: f64 = 6.0;
@@ -101,10 +100,10 @@ fn check_head(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Finding
             findings.push(
                 toml.finding(
                     &key,
-                    format!("the results have a column `{}` already", factor.name),
+                    format!("the results already have a column `{}`", factor.name),
                 )
                 .hint(if factor.name == "goal" {
-                    "every goal is studied anyway; `goals = [..]` names some of them"
+                    "all goals are studied by default; `goals = [..]` selects some of them"
                 } else {
                     "give the factor another name"
                 }),
@@ -113,7 +112,7 @@ fn check_head(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Finding
             findings.push(toml.finding(
                 &key,
                 format!(
-                    "factors {} and {} are both called `{}`",
+                    "factors {} and {} are both named `{}`",
                     first + 1,
                     index + 1,
                     factor.name
@@ -136,9 +135,9 @@ fn check_search(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Findi
         findings.push(
             toml.finding(
                 "search",
-                "no factor has `role = \"choice\"`: there is nothing to choose",
+                "no factor has `role = \"choice\"`: a search needs control factors",
             )
-            .hint("give it to what is yours to choose, such as the place of the robot's base"),
+            .hint("set it for control factors, such as the base placement"),
         );
     }
     if search.second_objective == Some(search.objective) {
@@ -147,7 +146,7 @@ fn check_search(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Findi
                 "search.second_objective",
                 format!("is the first one, `{}`, again", search.objective.name()),
             )
-            .hint("name another one, or leave it out"),
+            .hint("name another one, or omit it"),
         );
     }
     for (index, class) in search.classes.iter().flatten().enumerate() {
@@ -199,10 +198,9 @@ fn goals(
         return Ok(known);
     };
     if wanted.is_empty() {
-        return Err(toml.finding("goals", "no goal at all").hint(format!(
-            "leave it out, or name some of {}",
-            known.join(", ")
-        )));
+        return Err(toml
+            .finding("goals", "no goals")
+            .hint(format!("omit it, or name some of {}", known.join(", "))));
     }
     for (index, name) in wanted.iter().enumerate() {
         let key = format!("goals[{index}]");
@@ -272,7 +270,7 @@ impl FactorContext<'_> {
                 .finding(
                     given[0],
                     format!(
-                        "the factor `{}` is sampled, but nothing says how often",
+                        "the factor `{}` is sampled, but the number of samples is missing",
                         section.name
                     ),
                 )
@@ -333,8 +331,8 @@ impl FactorContext<'_> {
             }
             if section.relative {
                 return Err(self
-                    .finding("relative", "levels set their keys: nothing is added")
-                    .hint("leave it out"));
+                    .finding("relative", "levels set their keys and cannot add to them")
+                    .hint("omit it"));
             }
             return Ok(None);
         }
@@ -363,7 +361,7 @@ impl FactorContext<'_> {
                     "values",
                     format!("the factor `{}` has no values", section.name),
                 )
-                .hint("an empty list has no case at all"));
+                .hint("an empty list has no cases"));
         }
         let mut levels: Vec<StudyLevel> = Vec::with_capacity(values.len());
         for (index, value) in values.iter().enumerate() {
@@ -399,7 +397,7 @@ impl FactorContext<'_> {
                     "grid.to",
                     format!("the grid ends where it begins, at {from}"),
                 )
-                .hint("a single value goes into `values`"));
+                .hint("give a single value under `values`"));
         }
         (0..steps)
             .map(|step| {
@@ -467,7 +465,7 @@ impl FactorContext<'_> {
                         "normal.within",
                         format!("the range from {low} to {high} is more than {FARTHEST_SD} standard deviations from the mean"),
                     )
-                    .hint("nearly nothing of the distribution lies there: use `range`"));
+                    .hint("almost none of the distribution is there: use `range`"));
             }
         }
         self.continuum(
@@ -493,7 +491,7 @@ impl FactorContext<'_> {
                     "sampled",
                     format!("a factor with `{name}` is always sampled"),
                 )
-                .hint("leave `sampled` out"));
+                .hint("omit `sampled`"));
         }
         for &example in examples {
             let change = if section.relative {
@@ -513,8 +511,8 @@ impl FactorContext<'_> {
     fn levels(&self, sections: &[super::LevelSection]) -> Result<Vec<StudyLevel>, Finding> {
         if sections.is_empty() {
             return Err(self
-                .finding("levels", "no level at all")
-                .hint("an empty list has no case at all"));
+                .finding("levels", "no levels")
+                .hint("an empty list has no cases"));
         }
         let mut levels: Vec<StudyLevel> = Vec::with_capacity(sections.len());
         for (index, section) in sections.iter().enumerate() {
@@ -525,7 +523,7 @@ impl FactorContext<'_> {
             if levels.iter().any(|level| level.label == section.name) {
                 return Err(self.finding(
                     &here("name"),
-                    format!("two levels are called `{}`", section.name),
+                    format!("two levels are named `{}`", section.name),
                 ));
             }
             let is_bare = |each: &super::LevelSection| {
@@ -536,11 +534,11 @@ impl FactorContext<'_> {
                     .finding(
                         &here("name"),
                         format!(
-                            "the level `{}` changes nothing, and is not alone",
+                            "the level `{}` changes nothing, but is not the only one",
                             section.name
                         ),
                     )
-                    .hint("one level may stand for the scenario as it is"));
+                    .hint("only one level may be the unchanged scenario"));
             }
             let mut changes = Vec::new();
             for (key, value) in &section.set {
@@ -635,7 +633,7 @@ fn check_together(
     if study.engines.is_some() && !some_dynamic {
         findings.push(
             toml.finding("engines", "no case of the study is dynamic")
-                .hint("`mode = \"dynamic\"`, or leave the engines out"),
+                .hint("set `mode = \"dynamic\"`, or omit the engines"),
         );
     }
 }

@@ -6,8 +6,7 @@ use std::fmt;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
-use crate::toml_text::TomlText;
-use crate::{Finding, nearest_name};
+use needlebench_input::{Finding, TomlText, nearest_name};
 
 /// Name of an engine. Which engines there are is for those to say who have them, by
 /// [`Overrides::engines`](crate::Overrides::engines).
@@ -58,9 +57,9 @@ pub(crate) fn check_engine_names(
     if names.is_empty() {
         let finding = toml.finding(key, "no engine is named");
         return vec![if known.is_empty() {
-            finding.hint("name one, or leave the key out")
+            finding.hint("name one, or omit the key")
         } else {
-            finding.hint(format!("some of {listed}, or leave the key out"))
+            finding.hint(format!("some of {listed}, or omit the key"))
         }];
     }
     let unknown = |(_, name): &(usize, &EngineName)| !known.contains(&name.as_ref());

@@ -1,22 +1,20 @@
-//! The study file: which scenario is varied, and how.
+//! The study file: a base scenario, and the factors that vary it.
 //!
-//! Units are the scenario's: those that the varied keys say.
+//! Units are the scenario's: those of the varied keys.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::LazyLock;
 
+use needlebench_input::schema::{COLUMN, FileSchema, LONGEST_NAME, NAME};
+use needlebench_input::{FileKind, Finding, ModelSource, TomlText, or_wrong_kind, read_text};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::Overrides;
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
-use crate::file_kind::{FileKind, or_wrong_kind};
-use crate::input::read_text;
 use crate::requirements::Requirements;
 use crate::scenario::EngineName;
-use crate::schema::{COLUMN, FileSchema, LONGEST_NAME, NAME};
-use crate::toml_text::TomlText;
-use crate::{Finding, ModelSource, Overrides};
 use criteria::StudyCriteria;
 use requirements::study_requirements;
 use search::SearchSection;
@@ -29,7 +27,7 @@ pub mod search;
 /// What a study file may hold.
 pub(crate) static FILE: LazyLock<FileSchema> = LazyLock::new(FileSchema::of::<StudyFile>);
 
-/// One study: a scenario, factors that vary it, and what is asked of the results.
+/// One study: a scenario, the factors that vary it, and the criteria for the results.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyFile {
@@ -39,47 +37,44 @@ pub struct StudyFile {
     /// The question that the study answers, in a sentence or two.
     #[serde(default)]
     pub description: String,
-    /// The scenario that is varied: path relative to this file.
+    /// Base scenario: path relative to this file.
     pub scenario: String,
-    /// Seed of the samples. Draws of imperfections follow the scenario's own `seed`, which a factor
-    /// may vary.
+    /// Seed of the sampling. Draws of imperfections follow the scenario's own `seed`, which a factor may vary.
     #[serde(default)]
     pub seed: u64,
-    /// What is computed of a case: `static`, `planned` or `dynamic`. A level of a factor may say
-    /// otherwise. If left out: `planned` for up to 512 cases, which is a matter of minutes, and `static`,
-    /// postures only, for more.
+    /// Evaluation of a case: `static`, `planned` or `dynamic`; a level of a factor may override it. Default: `planned`
+    /// for up to 512 cases (some minutes), `static` (postures only) for more.
     #[serde(default)]
     pub mode: Option<StudyMode>,
-    /// Static cases that are planned too, drawn at random by the `seed`, to say how much a study of
-    /// postures alone overstates; 0 for none. Of a study with factors to choose, cases of the best choice.
+    /// Number of static cases, sampled by the `seed`, that are planned too, to estimate the optimistic bias of a study
+    /// of postures only; 0 for none. In a study with control factors they are cases of the best candidate.
     #[serde(default = "replanned_cases")]
     #[schemars(range(max = 10_000))]
     pub replanned_cases: u32,
-    /// Engines of dynamic cases; the scenario's if left out.
+    /// Engines of dynamic cases. Default: the scenario's.
     #[serde(default)]
     pub engines: Option<Vec<EngineName>>,
-    /// Goals of the scenario that are studied; all if left out.
+    /// Goals of the scenario to study. Default: all.
     #[serde(default)]
     pub goals: Option<Vec<String>>,
-    /// How the factors that are not crossed are sampled.
+    /// Sampling of the factors that are not crossed.
     #[serde(default)]
     pub sampling: SamplingSection,
-    /// What is varied.
+    /// Factors that vary the scenario.
     #[schemars(length(min = 1), extend("x-hint" = "a [[factors]] with `name`, `key` and, say, `range = [-30, 30]`"))]
     pub factors: Vec<FactorSection>,
-    /// What is asked of the results.
+    /// Criteria for the results.
     #[serde(default)]
     pub criteria: StudyCriteria,
-    /// What criteria stand for: the id or text of a requirement by the key of its criterion, such as
-    /// `min_layouts_working = "SRS-1: works in 95 % of patients"`. Carried to reports, with a trace matrix.
+    /// Requirements that criteria verify: the id or text of a requirement by the key of its criterion, such as
+    /// `min_layouts_working = "SRS-1: works in 95 % of patients"`. Reports show them with a trace matrix.
     #[serde(default)]
     #[schemars(schema_with = "study_requirements")]
     pub requirements: Requirements,
-    /// The smallest shift and tilt of the phantom that break a configuration; not computed if left
-    /// out.
+    /// Minimum shift and tilt of the phantom that make a configuration infeasible. Default: not computed.
     #[serde(default)]
     pub robustness: Option<RobustnessSection>,
-    /// What `needlebench search` looks for among the factors to choose.
+    /// Optimisation of the control factors by `needlebench search`.
     #[serde(default)]
     pub search: Option<SearchSection>,
 }
@@ -88,11 +83,11 @@ fn replanned_cases() -> u32 {
     32
 }
 
-/// Most cases of a study that are planned where it does not say what is computed: each takes a second or
-/// so of one thread, 0.4 to 1 s for the shipped ones, so that all take some minutes.
+/// Maximum number of cases that are planned by default: each takes about a second of one thread, 0.4 to 1 s for the
+/// shipped ones, some minutes for all.
 const MOST_PLANNED_BY_DEFAULT: u64 = 512;
 
-/// What is computed of a case.
+/// Evaluation of a case.
 #[derive(
     Debug,
     Clone,
@@ -109,10 +104,10 @@ const MOST_PLANNED_BY_DEFAULT: u64 = 512;
 )]
 #[serde(rename_all = "lowercase")]
 pub enum StudyMode {
-    /// Final postures: inverse kinematics, clearances, margins, the predicted place of the tip.
+    /// Final postures: inverse kinematics, clearances, margins, predicted tip position.
     #[default]
     Static,
-    /// Motions too, with proven clearances; nothing is simulated.
+    /// Motions too, with certified clearances; no simulation.
     Planned,
     /// Motions are simulated and measured.
     Dynamic,
@@ -129,15 +124,14 @@ impl StudyMode {
     }
 }
 
-/// How points are spread over the factors that are sampled.
+/// Sampling design of the sampled factors.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SamplingMethod {
-    /// Sobol's sequence with Owen's scrambling: evenest. Numbers of samples that are powers of two
-    /// are best.
+    /// Sobol sequence with Owen scrambling: the most uniform. Powers of two are the best sample sizes.
     #[default]
     Sobol,
-    /// Latin hypercube: even in every factor by itself.
+    /// Latin hypercube: uniform in every single factor.
     LatinHypercube,
     /// Independent points.
     Random,
@@ -154,25 +148,25 @@ impl SamplingMethod {
     }
 }
 
-/// How the factors that are not crossed are sampled.
+/// Sampling of the factors that are not crossed.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SamplingSection {
-    /// `sobol`, `latin-hypercube` or `random`.
+    /// Sampling design: `sobol`, `latin-hypercube` or `random`.
     pub method: SamplingMethod,
-    /// Points in every combination of the crossed factors, the same ones in each. Needed where a
-    /// factor is sampled.
+    /// Number of points in every combination of the crossed factors, the same points in each. Required if a factor is
+    /// sampled.
     #[schemars(range(min = 1, max = 1_u64 << 32))]
     pub samples: Option<u64>,
 }
 
-/// Whether a factor is ours to choose.
+/// Role of a factor in the design.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// Where the robot stands, which tool it has: what a study is to find the best level of.
+    /// A control factor, such as base placement or tool: the study finds its best level.
     Choice,
-    /// How the patient lies, what was drawn: what a choice is to hold for.
+    /// A noise factor, such as patient position or a draw: a candidate must be feasible over its values.
     #[default]
     Circumstance,
 }
@@ -181,30 +175,30 @@ pub enum Role {
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FactorSection {
-    /// Name of its column in the results: letters, digits and `_`.
-    #[schemars(regex(pattern = COLUMN), length(max = LONGEST_NAME), extend("x-hint" = "it is the name of a column"))]
+    /// Column name in the results: letters, digits and `_`.
+    #[schemars(regex(pattern = COLUMN), length(max = LONGEST_NAME), extend("x-hint" = "it is a column name"))]
     pub name: String,
-    /// Key of the scenario that it sets, such as `phantom.position_mm[0]`, `tool.urdf`, `seed` or
-    /// `goal.roll_deg`, where `goal` is whichever goal a case has. Not used with `levels`.
+    /// Scenario key that the factor sets, such as `phantom.position_mm[0]`, `tool.urdf`, `seed` or `goal.roll_deg`,
+    /// where `goal` is the goal of the case. Not used with `levels`.
     #[serde(default)]
     pub key: Option<String>,
-    /// `choice` for what is ours to choose, `circumstance` for what the choice has to hold for.
+    /// `choice` for a control factor, `circumstance` for a noise factor.
     #[serde(default)]
     pub role: Role,
-    /// Adds to the scenario's number instead of replacing it.
+    /// Adds to the scenario's value instead of replacing it.
     #[serde(default)]
     pub relative: bool,
-    /// Draws from `values`, `grid` or `levels`, all equally likely, instead of crossing them with the
-    /// other factors.
+    /// Samples from `values`, `grid` or `levels` with equal probability, instead of crossing them with the other
+    /// factors.
     #[serde(default)]
     pub sampled: bool,
-    /// Values, crossed with those of other factors.
+    /// Values, crossed with those of the other factors.
     #[serde(default)]
     pub values: Option<Vec<Setting>>,
-    /// Evenly spaced numbers, ends included, crossed with the values of other factors.
+    /// Evenly spaced numbers, ends included, crossed with the values of the other factors.
     #[serde(default)]
     pub grid: Option<GridSection>,
-    /// Lower and upper end of a range that is sampled uniformly.
+    /// Bounds of a range that is sampled uniformly.
     #[serde(default)]
     #[schemars(inner(range(min = -1e12, max = 1e12)))]
     pub range: Option<[f64; 2]>,
@@ -220,13 +214,13 @@ pub struct FactorSection {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridSection {
-    /// The first.
+    /// First value.
     #[schemars(range(min = -1e12, max = 1e12))]
     pub from: f64,
-    /// The last.
+    /// Last value.
     #[schemars(range(min = -1e12, max = 1e12))]
     pub to: f64,
-    /// How many, both ends included: at least 2.
+    /// Number of values, both ends included, at least 2.
     #[schemars(range(min = 2, max = 100_000), extend("x-hint" = "both ends are included"))]
     pub steps: u32,
 }
@@ -239,9 +233,9 @@ pub struct NormalSection {
     #[schemars(range(min = -1e12, max = 1e12))]
     pub mean: f64,
     /// Standard deviation.
-    #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0, "x-hint" = "it has to be positive; a fixed value goes into the scenario"))]
+    #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0, "x-hint" = "it must be positive; a fixed value belongs in the scenario"))]
     pub sd: f64,
-    /// Ends beyond which nothing is drawn (a truncated normal distribution); none if left out.
+    /// Bounds of a truncated normal distribution. Default: none.
     #[serde(default)]
     #[schemars(inner(range(min = -1e12, max = 1e12)))]
     pub within: Option<[f64; 2]>,
@@ -253,25 +247,25 @@ pub struct NormalSection {
 pub struct LevelSection {
     /// Name in the results.
     pub name: String,
-    /// Keys of the scenario and their values.
+    /// Scenario keys and their values.
     #[serde(default)]
     pub set: BTreeMap<String, Setting>,
-    /// What is computed of cases with this level; the study's `mode` if left out.
+    /// Evaluation of cases with this level. Default: the study's `mode`.
     #[serde(default)]
     pub mode: Option<StudyMode>,
-    /// Engines of dynamic cases with this level; the study's if left out.
+    /// Engines of dynamic cases with this level. Default: the study's.
     #[serde(default)]
     pub engines: Option<Vec<EngineName>>,
 }
 
-/// How far the phantom may move before a configuration breaks.
+/// Search for the minimum motion of the phantom that makes a configuration infeasible.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RobustnessSection {
-    /// Largest shift that is looked at, mm.
+    /// Maximum shift searched, mm.
     #[schemars(range(max = 1000.0), extend("exclusiveMinimum" = 0.0))]
     pub max_shift_mm: f64,
-    /// Largest tilt that is looked at, deg.
+    /// Maximum tilt searched, deg.
     #[schemars(range(max = 180.0), extend("exclusiveMinimum" = 0.0))]
     pub max_tilt_deg: f64,
 }
@@ -285,16 +279,16 @@ impl Default for RobustnessSection {
     }
 }
 
-/// What a factor does to a scenario.
+/// Effect of a factor on a scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyFactor {
     /// Name of its column.
     pub name: String,
     /// Unit, from the key; empty if it has none.
     pub unit: String,
-    /// Whether it is ours to choose.
+    /// Whether it is a control or a noise factor.
     pub role: Role,
-    /// Drawn by the sampling instead of crossed.
+    /// Sampled instead of crossed.
     pub sampled: bool,
     /// Its values.
     pub values: FactorValues,
@@ -303,7 +297,7 @@ pub struct StudyFactor {
 /// Values of a factor.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FactorValues {
-    /// Some.
+    /// Discrete levels.
     Levels(Vec<StudyLevel>),
     /// A continuum that a key is set to.
     Continuum {
@@ -311,27 +305,27 @@ pub enum FactorValues {
         key: KeyPath,
         /// Adds to the scenario's number.
         relative: bool,
-        /// What numbers are drawn from.
+        /// What its numbers are sampled from.
         distribution: Distribution,
     },
 }
 
-/// One of some values.
+/// One discrete level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyLevel {
-    /// In tables.
+    /// Label in tables.
     pub label: String,
-    /// If it is a number.
+    /// Its value, if it is a number.
     pub number: Option<f64>,
-    /// What it does to the scenario.
+    /// Its changes to the scenario.
     pub changes: Vec<(KeyPath, Change)>,
-    /// What is computed of its cases, if not the study's.
+    /// Evaluation of its cases, if not the study's.
     pub mode: Option<StudyMode>,
     /// Engines of its dynamic cases, if not the study's.
     pub engines: Option<Vec<EngineName>>,
 }
 
-/// What numbers are drawn from.
+/// Distribution of a sampled factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Distribution {
     /// Uniform.
@@ -341,14 +335,14 @@ pub enum Distribution {
         /// Upper end.
         high: f64,
     },
-    /// Normal, truncated where ends are given.
+    /// Normal, truncated where bounds are given.
     Normal(NormalSection),
 }
 
-/// A study with everything that it names read and checked.
+/// A study, with all files that it names read and checked.
 #[derive(Debug)]
 pub struct ResolvedStudy {
-    /// The file as it was read.
+    /// The study file as read.
     pub file: StudyFile,
     /// The file.
     pub source: ModelSource,
@@ -358,7 +352,7 @@ pub struct ResolvedStudy {
     pub goals: Vec<String>,
     /// The factors.
     pub factors: Vec<StudyFactor>,
-    /// What is computed of a case, unless a level says otherwise.
+    /// Evaluation of a case, unless a level overrides it.
     pub mode: StudyMode,
 }
 
@@ -383,8 +377,8 @@ pub fn study_schema() -> serde_json::Value {
     FILE.published()
 }
 
-/// A study's text as its sections, each value in its range. The scenario and what the factors do to it
-/// are not looked at: [`load_study`] does.
+/// A study's text as its sections, each value in its range. The scenario and the effect of the factors on it are
+/// checked by [`load_study`].
 ///
 /// # Errors
 /// Every [`Finding`] about the text, or about its keys and values.

@@ -15,20 +15,18 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Finding;
-use crate::input::read_text;
-use crate::schema::{FileSchema, LONGEST_NAME, NAME};
-use crate::toml_text::TomlText;
+use needlebench_input::schema::{FileSchema, LONGEST_NAME, NAME};
+use needlebench_input::{Finding, TomlText, read_text};
 
-/// Whose frame the places are in.
+/// Frame of the marker positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MarkerFrame {
     /// The robot's `base_link`, as URDFs and ROS have it.
     BaseLink,
-    /// The robot's `base`, as the controller shows it: `base_link` turned by half a turn about z.
+    /// The robot's `base`, as the controller shows it: `base_link` rotated by 180 deg about z.
     Base,
-    /// That of a drawing of what carries the markers: it says nothing of the robot.
+    /// The frame of a drawing of the marker carrier, unrelated to the robot.
     Drawing,
 }
 
@@ -36,7 +34,7 @@ pub enum MarkerFrame {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MarkerList {
-    /// Frame of the places: `base_link`, `base` or `drawing`.
+    /// Frame of the marker positions: `base_link`, `base` or `drawing`.
     pub frame: MarkerFrame,
     /// Diameter of the dense sphere in each marker, mm.
     #[schemars(range(min = 2.0, max = 20.0))]
@@ -45,16 +43,16 @@ pub struct MarkerList {
     /// bare spheres if not.
     #[serde(default = "yes")]
     pub carrier: bool,
-    /// Standard deviation of each place along each axis, mm.
+    /// Standard deviation of each position per axis, mm.
     #[schemars(range(min = 0.001, max = 20.0))]
     pub sd_mm: f64,
-    /// Standard deviation of how each marker was put on, mm, where the list is a drawing that people follow: for telling
-    /// which is which, not for the registration. 0.5 mm if left out.
+    /// Standard deviation of the placement of each marker, mm, where the list is a drawing: for the matching, not for
+    /// the registration. Default: 0.5 mm.
     #[serde(default)]
     #[schemars(range(min = 0.01, max = 20.0))]
     pub placement_mm: Option<f64>,
     /// The markers, in any order; some may be missing in the scan.
-    #[schemars(length(min = 3), extend("x-hint" = "a rigid registration needs three that are not on one line"))]
+    #[schemars(length(min = 3), extend("x-hint" = "a rigid registration needs three that are not collinear"))]
     pub markers: Vec<ListedMarker>,
 }
 
@@ -68,7 +66,7 @@ pub struct ListedMarker {
     /// Centre of its sphere, mm.
     #[schemars(inner(range(min = -5000.0, max = 5000.0)))]
     pub position_mm: [f64; 3],
-    /// Its own standard deviation along each axis, mm, instead of the list's.
+    /// Standard deviation of this marker's position per axis, mm, instead of the list's.
     #[serde(default)]
     #[schemars(range(min = 0.001, max = 20.0))]
     pub sd_mm: Option<f64>,
@@ -91,8 +89,8 @@ impl MarkerList {
     pub fn load(path: &Path) -> Result<Self, Vec<Finding>> {
         let file = path.display().to_string();
         let text = read_text(path).map_err(|error| {
-            let hint = error.hint("a TOML file with the places of the markers");
-            vec![Finding::new(&file, format!("the markers cannot be read: {error}")).hint(hint)]
+            let hint = error.hint("a TOML file with the marker positions");
+            vec![Finding::new(&file, format!("cannot read the markers: {error}")).hint(hint)]
         })?;
         Self::parse(&file, &text)
     }
@@ -108,7 +106,7 @@ impl MarkerList {
             let earlier = &list.markers[..index];
             if earlier.iter().any(|each| each.name == marker.name) {
                 let key = format!("markers[{index}].name");
-                let finding = toml.finding(&key, format!("`{}` is there twice", marker.name));
+                let finding = toml.finding(&key, format!("duplicate marker `{}`", marker.name));
                 return Err(vec![finding.hint("give each marker its own name")]);
             }
         }
@@ -147,7 +145,7 @@ mod tests {
         for (from, to, line, words) in [
             ("\"base_link\"", "\"tool\"", 1, "base"),
             ("sphere_mm = 8", "sphere_mm = 800", 2, "sphere_mm"),
-            ("\"b\"", "\"a\"", 10, "twice"),
+            ("\"b\"", "\"a\"", 10, "duplicate"),
             ("[4, 5, 6]", "[4, 5]", 11, "position_mm"),
         ] {
             let findings = MarkerList::parse("m.toml", &LIST.replace(from, to)).unwrap_err();

@@ -6,9 +6,8 @@ use std::sync::LazyLock;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::files::Location;
-use crate::schema::FileSchema;
-use crate::toml_text::TomlText;
+use needlebench_input::schema::FileSchema;
+use needlebench_input::{Location, TomlText};
 
 /// What an error is of.
 #[derive(
@@ -22,7 +21,7 @@ pub enum Stage {
     DueToInsertion,
     /// Both.
     Total,
-    /// What somebody would put up with.
+    /// Accepted by radiologists.
     Allowed,
 }
 

@@ -12,12 +12,10 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::Finding;
-use crate::input::read_text;
-use crate::schema::FileSchema;
-use crate::toml_text::TomlText;
+use needlebench_input::schema::FileSchema;
+use needlebench_input::{Finding, TomlText, read_text};
 
-/// Where the quantities of a log stand, and in which units.
+/// Columns and units of the quantities of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogColumns {
     /// The file.
@@ -38,7 +36,7 @@ pub struct MappedColumns {
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Content {
-    /// Time of the row.
+    /// Timestamp of the row.
     time: One<TimeUnit>,
     /// Set-points of the joints.
     #[serde(default)]
@@ -52,7 +50,7 @@ struct Content {
     /// The controller's rigid-body torques, without friction.
     #[serde(default)]
     target_moment: Option<Six<TorqueUnit>>,
-    /// Currents that the controller asks for.
+    /// Set-points of the joint currents.
     #[serde(default)]
     target_current: Option<Six<CurrentUnit>>,
     /// Joint angles as measured.
@@ -66,16 +64,16 @@ struct Content {
     /// Torques at the joints as measured, friction included.
     #[serde(default)]
     actual_torque: Option<Six<TorqueUnit>>,
-    /// Position of the tool's point in the controller's `base` frame.
+    /// Position of the tool centre point in the controller's `base` frame.
     #[serde(default)]
     tcp_position: Option<Three<LengthUnit>>,
     /// Its rotation vector.
     #[serde(default)]
     tcp_rotation: Option<Three<AngleUnit>>,
-    /// Mass of the load that the controller believes in, kg.
+    /// Payload mass set in the controller, kg.
     #[serde(default)]
     payload: Option<One<MassUnit>>,
-    /// Its centre in the flange frame.
+    /// Its centre of mass in the flange frame.
     #[serde(default)]
     payload_cog: Option<Three<LengthUnit>>,
     /// The controller's mode; 7 is running.
@@ -170,7 +168,7 @@ impl LogColumns {
         let file = path.display().to_string();
         let text = read_text(path).map_err(|error| {
             let hint = error.hint("a TOML file that names the columns of the log");
-            vec![Finding::new(&file, format!("the columns cannot be read: {error}")).hint(hint)]
+            vec![Finding::new(&file, format!("cannot read the columns: {error}")).hint(hint)]
         })?;
         Self::parse(file, text)
     }
@@ -196,8 +194,8 @@ impl LogColumns {
         match lone {
             Some((key, other)) => Err(vec![
                 columns
-                    .finding(key, format!("`{key}` stands without `{other}`"))
-                    .hint("a pose has a position and a rotation vector; leave out both or none"),
+                    .finding(key, format!("`{key}` requires `{other}`"))
+                    .hint("a pose needs a position and a rotation vector; give both or neither"),
             ]),
             None => Ok(columns),
         }

@@ -11,12 +11,12 @@ pub use key_path::KeyPath;
 pub use moves::{MovedPhantom, PhantomMove, PhantomMoves, SHIFT_KEYS, TURN_KEYS};
 pub use setting::{Change, Setting};
 
-use crate::resolve::{ModelLibrary, resolve};
+use crate::resolve::{ChosenEntries, ModelLibrary, resolve};
 use crate::scenario::{GoalSection, Scenario};
-use crate::schema::Misfit;
-use crate::toml_text::TomlText;
-use crate::{Finding, Overrides, ResolvedScenario, load_scenario, nearest_name};
+use crate::{Overrides, ResolvedScenario, load_scenario};
 use edit::{Editable, Edited};
+use needlebench_input::schema::Misfit;
+use needlebench_input::{Finding, TomlText, nearest_name};
 
 /// A scenario of which layouts are made by changing keys.
 ///
@@ -31,7 +31,7 @@ pub struct ScenarioFamily {
     library: ModelLibrary,
 }
 
-/// Refuses a cell of which not all is seen: cases that come out of it would say what nobody knows.
+/// Rejects a cell with parts without collision shape: its cases could not be evaluated.
 fn all_seen(resolved: &ResolvedScenario) -> Result<(), Vec<Finding>> {
     let mut names: Vec<&str> = resolved
         .cell
@@ -45,10 +45,10 @@ fn all_seen(resolved: &ResolvedScenario) -> Result<(), Vec<Finding>> {
     if names.is_empty() {
         return Ok(());
     }
-    let message = format!("no collision shape is known of {}", names.join(", "));
+    let message = format!("no collision shape for {}", names.join(", "));
     Err(vec![
-        Finding::new(&resolved.cell.robot.source.file, message).hint(
-            "give the link a <collision>; for one that needs none, say so in the scenario: `shape.NAME = \"none\"` \
+        Finding::new(&resolved.robot_description.source.file, message).hint(
+            "give the link a <collision>; for one that needs none, set in the scenario: `shape.NAME = \"none\"` \
              under [robot] or [tool]",
         ),
     ])
@@ -74,7 +74,7 @@ impl ScenarioFamily {
         overrides: &Overrides,
     ) -> Result<Self, Vec<Finding>> {
         all_seen(&base)?;
-        let arm = base.cell.robot.arm.as_ref();
+        let arm = base.robot_description.arm.as_ref();
         let editable = Editable::new(base.scenario.clone(), arm)
             .map_err(|error| vec![Finding::new(&base.source.file, error)])?;
         Ok(Self {
@@ -112,6 +112,18 @@ impl ScenarioFamily {
         goal: &str,
         changes: &[(KeyPath, Change)],
     ) -> Result<ResolvedScenario, Vec<Finding>> {
+        let (resolved, chosen) = self.varied(goal, changes, None)?;
+        Ok(chosen.planned.put_back(resolved))
+    }
+
+    /// As [`ScenarioFamily::vary`], with the entry that was chosen in the section of an open goal, and what was chosen. With
+    /// an `entry`, deg, none is to be chosen.
+    fn varied(
+        &self,
+        goal: &str,
+        changes: &[(KeyPath, Change)],
+        entry: Option<[f64; 2]>,
+    ) -> Result<(ResolvedScenario, ChosenEntries), Vec<Finding>> {
         let file = &self.base.source.file;
         let index = self
             .goal(goal)
@@ -146,11 +158,16 @@ impl ScenarioFamily {
             Ok::<_, Vec<Finding>>(made)
         };
         let mut scenario = scenario;
-        let Some(chooser) = self.overrides.choose_entry else {
-            return resolved(scenario, true);
+        if let (Some(goal), Some(entry)) = (scenario.goals.first_mut(), entry) {
+            goal.entry_direction_deg = Some(entry);
+            goal.route = None;
+        }
+        let none = ChosenEntries::default;
+        let Some(chooser) = &self.overrides.choose_entry else {
+            return Ok((resolved(scenario, true)?, none()));
         };
         if !scenario.goals.iter().any(GoalSection::is_open) {
-            return resolved(scenario, true);
+            return Ok((resolved(scenario, true)?, none()));
         }
         // Routes are planned for each layout.
         let empty = Scenario {
@@ -158,7 +175,7 @@ impl ScenarioFamily {
             ..scenario.clone()
         };
         let chosen = chooser.choose(&toml, &resolved(empty, false)?, &mut scenario.goals)?;
-        Ok(chosen.planned.put_back(resolved(scenario, true)?))
+        Ok((resolved(scenario, true)?, chosen))
     }
 
     /// Whether the scenario has such a key, and the change fits its type, for every goal. A value out of

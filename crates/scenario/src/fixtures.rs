@@ -63,8 +63,7 @@ impl Fixture {
 pub enum FixtureError {
     /// The housing does not enclose the bore.
     #[error(
-        "{key} is {size_mm} mm, which leaves less than {least_mm} mm of housing beside a bore of \
-         {bore_mm} mm"
+        "{key} is {size_mm} mm: less than {least_mm} mm of housing beside a bore of {bore_mm} mm"
     )]
     HousingTooSmall {
         /// `outer_width_mm` or `outer_height_mm`.
@@ -76,17 +75,17 @@ pub enum FixtureError {
         /// Smallest thickness of the housing beside the bore, mm.
         least_mm: f64,
     },
-    /// The base looks where this kind of mount cannot carry it.
+    /// The base has an orientation that this kind of mount does not support.
     #[error(
-        "the robot's base is tilted by {tilt_deg:.3} deg from upright, and a mount of the kind \
-         `{kind}` carries {carries}"
+        "the robot's base is tilted by {tilt_deg:.3} deg from upright, but a mount of kind `{kind}` \
+         supports {carries}"
     )]
     BaseTilted {
         /// As in a scenario.
         kind: &'static str,
         /// Angle between the base's z axis and the vertical, deg.
         tilt_deg: f64,
-        /// What it could carry.
+        /// The supported orientations.
         carries: &'static str,
     },
     /// There is not enough space between the base and what the mount stands on or hangs from.
@@ -105,8 +104,8 @@ pub enum FixtureError {
     },
     /// The plate's edge would reach past the end of the wedge.
     #[error(
-        "`wedge_height_mm` is {height_mm} mm, and the plate's edge reaches {edge_mm:.1} mm behind its \
-         middle"
+        "`wedge_height_mm` is {height_mm} mm, but the plate's edge extends {edge_mm:.1} mm behind its \
+         centre"
     )]
     WedgeTooLow {
         /// Height of the wedge, mm.
@@ -115,9 +114,7 @@ pub enum FixtureError {
         edge_mm: f64,
     },
     /// A mount on the table's rail, without a table.
-    #[error(
-        "a mount of the kind `table_rail` is clamped to a table's rail, and there is no [table]"
-    )]
+    #[error("a mount of kind `table_rail` requires a [table]")]
     NoTable,
 }
 
@@ -132,18 +129,18 @@ impl FixtureError {
         }
     }
 
-    /// How to mend it.
+    /// How to fix it.
     pub(crate) fn hint(&self) -> &'static str {
         match self {
             Self::HousingTooSmall { .. } => "lengths are in millimetres",
-            Self::WedgeTooLow { .. } => "make the wedge higher, or the plate narrower",
+            Self::WedgeTooLow { .. } => "use a higher wedge or a narrower plate",
             Self::NoTable => "add a [table], or choose another kind",
             Self::BaseTilted { .. } => {
                 "`base_rpy_deg` under [robot] turns the base; kinds are column (upright), wedge \
                  (tilted), wall, ceiling (hanging) and table_rail"
             }
             Self::BaseTooNear { .. } => {
-                "see `base_position_mm` under [robot]; leave [mount] out for a base bolted to the \
+                "see `base_position_mm` under [robot]; omit [mount] for a base bolted to the \
                  floor or the ceiling"
             }
         }

@@ -1,14 +1,13 @@
 //! Changes of keys, applied to a scenario's struct.
 
+use needlebench_input::schema::{Misfit, MisfitKind, Path};
+use needlebench_robot::ArmInUse;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
 use super::key_path::{KeyPath, Step, section};
 use super::setting::{Change, Setting, number_value};
-use crate::ArmInUse;
 use crate::scenario::{GoalSection, Scenario};
-use crate::schema::{Misfit, MisfitKind, Path};
-use crate::toml_value;
 
 /// A scenario's struct, and all of it that has a value as a table, defaults included.
 #[derive(Debug, Clone)]
@@ -223,7 +222,7 @@ fn changed(
             Change::Set(Setting(setting)) => Ok(setting.clone()),
             Change::Add(number) => match value.as_ref().map(|value| Setting(value.clone())) {
                 None => Err(error(
-                    "there is nothing to add to: the scenario does not give this key".to_owned(),
+                    "no value to add to: the scenario does not give this key".to_owned(),
                     Some("give it there, or give the values themselves".to_owned()),
                 )),
                 Some(setting) => setting.number().map_or_else(
@@ -279,7 +278,7 @@ fn changed(
 
 /// The schema holds, so this fails by a mistake of ours alone.
 fn read<T: DeserializeOwned>(section: &str, value: &Value) -> Result<T, Misfit> {
-    toml_value::read(value).map_err(|message| Misfit {
+    needlebench_input::read_value(value).map_err(|message| Misfit {
         key: section.to_owned(),
         kind: MisfitKind::Type,
         message,

@@ -6,12 +6,10 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::Finding;
-use crate::input::read_text;
-use crate::schema::FileSchema;
-use crate::toml_text::TomlText;
+use needlebench_input::schema::FileSchema;
+use needlebench_input::{Finding, TomlText, read_text};
 
-/// A file of thresholds: how much worse each metric may get.
+/// A file of thresholds: the maximum loss of each metric.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThresholdsFile {
     file: String,
@@ -22,13 +20,13 @@ pub struct ThresholdsFile {
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Content {
-    /// A configuration that no longer works does not fail the comparison.
+    /// A configuration that is no longer feasible does not fail the comparison.
     #[serde(default)]
     allow_status_change: bool,
-    /// A goal, a configuration, a metric or cases that only the first result has do not fail the comparison.
+    /// Goals, configurations, metrics or cases that only the first result has do not fail the comparison.
     #[serde(default)]
     allow_lost: bool,
-    /// Largest loss by metric, with its unit.
+    /// Maximum loss by metric, with its unit.
     #[serde(default)]
     max_loss: BTreeMap<String, String>,
 }
@@ -37,12 +35,12 @@ impl ThresholdsFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// If it cannot be read, is no TOML, or has other keys.
+    /// If it cannot be read, is not TOML, or has other keys.
     pub fn load(path: &Path) -> Result<Self, Finding> {
         let file = path.display().to_string();
         let text = read_text(path).map_err(|error| {
             let hint = error.hint("thresholds are a TOML file with the section [max_loss]");
-            Finding::new(&file, format!("the thresholds cannot be read: {error}")).hint(hint)
+            Finding::new(&file, format!("cannot read the thresholds: {error}")).hint(hint)
         })?;
         Self::parse(file, text)
     }
@@ -58,7 +56,7 @@ impl ThresholdsFile {
         })
     }
 
-    /// Whether a configuration that no longer works does not fail the comparison.
+    /// Whether a configuration that is no longer feasible does not fail the comparison.
     pub fn allow_status_change(&self) -> bool {
         self.content.allow_status_change
     }
