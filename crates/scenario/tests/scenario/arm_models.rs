@@ -5,8 +5,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use needlebench_cell::{Overrides, Robot, load_robot};
 use needlebench_kinematics::{Joints, Pose, rotation_angle_between};
+use needlebench_robot::LoadedRobot;
+use needlebench_scenario::{Overrides, load_robot};
 
 /// Twists of the DH chain of every UR arm, rad.
 const TWISTS: [f64; 6] = [FRAC_PI_2, 0.0, 0.0, FRAC_PI_2, -FRAC_PI_2, 0.0];
@@ -91,7 +92,7 @@ const PUBLISHED: [Published; 3] = [
 const ROUNDING: f64 = 1e-14;
 
 /// The shipped arm and what is published of it.
-fn arms() -> impl Iterator<Item = (Robot, &'static Published)> {
+fn arms() -> impl Iterator<Item = (LoadedRobot, &'static Published)> {
     PUBLISHED.iter().map(|published| {
         let overrides = Overrides {
             arm: Some(published.arm.to_owned()),

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
-use needlebench_cell::{
-    BodyKind, Cell, Change, ClearanceClass, CollisionBody, Finding, KeyPath, Overrides,
-    ResolvedScenario, ScenarioFamily, Setting, resolve_scenario,
-};
+use needlebench_cell::{BodyKind, Cell, ClearanceClass, CollisionBody};
 use needlebench_geometry::{PreparedShape, Shape, separation};
+use needlebench_input::Finding;
 use needlebench_kinematics::Pose;
+use needlebench_scenario::{
+    Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting, resolve_scenario,
+};
 
 /// Rounding of places of some metres.
 const ROUNDING_M: f64 = 1e-12;
@@ -141,7 +142,7 @@ fn every_shape_is_measured_for_the_class_that_is_named() {
             .iter()
             .filter(|pair| Some(pair.b) == index)
             .collect();
-        // Six links, the tool and its guide tube; and the space behind the guide.
+        // Six links, the tool and its guide tube; and the access zone.
         let of_class = pairs.iter().filter(|pair| pair.class.name() == class);
         assert_eq!(of_class.count(), 8);
         let behind_guide =
@@ -208,33 +209,33 @@ fn obstacles_that_cannot_be_are_refused_at_their_key() {
         (
             pole("position_mm = [0, 1500, 900]"),
             place,
-            "50.0 mm under the floor",
+            "50.0 mm below the floor",
         ),
         (
             pole("position_mm = [-300, 0, 950]"),
             place,
-            "into the table",
+            "overlaps the table",
         ),
         (
             pole("position_mm = [1500, 900, 950]"),
             place,
-            "into the gantry's housing",
+            "overlaps the gantry's housing",
         ),
         (
             pole("position_mm = [-280, 350, 950]"),
             place,
-            "into the robot's base",
+            "overlaps the robot's base",
         ),
         (
             pole("attached_to = \"gantry\"\nposition_mm = [-1800, 0, 600]"),
             place,
-            "into the table",
+            "overlaps the table",
         ),
         (twice, "obstacles[1].name", "two obstacles"),
         (
             pole("position_mm = [0, 1500, 950]").replace("\"pole\"", "\"forearm\""),
             "obstacles[0].name",
-            "something else in the cell",
+            "another body in the cell",
         ),
         (shaped("{}"), "obstacles[0].shape", "no shape"),
         (
@@ -297,19 +298,14 @@ fn what_is_built_into_a_thing_may_go_into_it() {
             "[[obstacles]]\nname = \"it\"\n{rest}\nshape = {{ box = {{ size_mm = [60, 60, 60] }} }}\n"
         );
         let resolved = room(&text).unwrap();
-        assert!(
-            !resolved
-                .notes
-                .iter()
-                .any(|note| note.contains("`it` hangs"))
-        );
+        assert!(!resolved.notes.iter().any(|note| note.contains("`it` is ")));
     }
     let hanging = room(
         "[[obstacles]]\nname = \"lamp\"\nposition_mm = [0, 0, 2100]\n\
          shape = { sphere = { radius_mm = 200 } }\n",
     )
     .unwrap();
-    let note = "obstacle `lamp` hangs 1900 mm over the floor";
+    let note = "obstacle `lamp` is 1900 mm above the floor without support";
     assert!(hanging.notes.iter().any(|each| each.contains(note)));
 }
 
@@ -355,7 +351,7 @@ fn place_and_presence_vary_as_the_text_would() {
     )];
     let findings = family.vary("a", &through).unwrap_err();
     assert!(
-        findings[0].message.contains("under the floor"),
+        findings[0].message.contains("below the floor"),
         "{findings:?}"
     );
 }
@@ -363,7 +359,7 @@ fn place_and_presence_vary_as_the_text_would() {
 #[test]
 fn a_criterion_for_obstacles_that_are_not_there_is_noted() {
     let judged = "[criteria.min_clearance_mm]\nrobot_obstacle = 30\n";
-    let note = "robot_obstacle` judges nothing: there is no [[obstacles]]";
+    let note = "robot_obstacle` is not evaluated: there is no [[obstacles]]";
     let has_note = |text: &str| {
         let resolved = room(&format!("{judged}{text}")).unwrap();
         resolved.notes.iter().any(|each| each.contains(note))

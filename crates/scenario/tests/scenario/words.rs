@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use needlebench_cell::{Overrides, load_scenario};
+use needlebench_scenario::{Overrides, load_scenario};
 
 #[test]
 fn words_of_a_scenario_name_parts_and_people() {
@@ -10,11 +10,11 @@ fn words_of_a_scenario_name_parts_and_people() {
     let resolved = load_scenario(&scenario, &Overrides::default()).expect("it is shipped");
     let words = resolved.words();
     for (name, expected) in [
-        ("doctor", "doctor across the table"),
-        ("doctor_2", "doctor at the feet"),
+        ("doctor", "physician across the table"),
+        ("doctor_2", "physician at the feet"),
         ("wrist_2", "wrist 2"),
         ("upper_arm", "upper arm"),
-        ("needle_corridor", "space behind the guide"),
+        ("needle_corridor", "access zone"),
         (
             "intercostal_vessels_right_5.7",
             "intercostal vessels of the right 5th rib",
@@ -34,5 +34,8 @@ fn words_of_a_scenario_name_parts_and_people() {
         assert!(is_own || !words.contains(['_', '.']), "{name}: {words}");
     }
     let doctors = &resolved.people.by_goal[0];
-    assert_eq!(doctors[0].in_words(1.75), "doctor across the table, 1.75 m");
+    assert_eq!(
+        doctors[0].in_words(1.75),
+        "physician across the table, 1.75 m"
+    );
 }

@@ -18,4 +18,5 @@ mod schema;
 mod schema_probes;
 mod study;
 mod urdf_slips;
+mod values;
 mod words;

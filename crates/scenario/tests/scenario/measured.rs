@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Point3};
-use needlebench_cell::imperfections::{Imperfections, Localisation};
-use needlebench_cell::{Finding, Overrides, ResolvedScenario, resolve_scenario};
+use needlebench_input::Finding;
+use needlebench_scenario::imperfections::{Imperfections, Localisation};
+use needlebench_scenario::{Overrides, ResolvedScenario, resolve_scenario};
 
 /// Rounding of a metre, and of roots of squares of millimetres.
 const ROUNDING: f64 = 1e-12;
@@ -115,7 +116,7 @@ fn each_marker_has_one_covariance() {
     is_refused(
         &format!("[imperfections.registration]\ncovariance_mm2 = [{six}]\n"),
         "imperfections.registration.covariance_mm2",
-        "markers that are not given",
+        "without their markers",
     );
 }
 
@@ -162,7 +163,7 @@ fn a_true_target_is_placed_with_the_phantom_and_changes_nothing_else() {
     let placed = resolved.phantom.as_ref().unwrap();
     let found = resolved.goals[0].true_target_m.unwrap();
     assert!((found - placed.world_from_phantom * in_phantom).norm() < ROUNDING);
-    let without = needlebench_cell::Goal {
+    let without = needlebench_scenario::Goal {
         true_target_m: None,
         ..resolved.goals[0].clone()
     };

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::{Finding, Overrides, ResolvedScenario, resolve_scenario};
+use needlebench_input::Finding;
+use needlebench_scenario::{Overrides, ResolvedScenario, resolve_scenario};
 
 /// Rounding of a metre.
 const ROUNDING_M: f64 = 1e-12;
@@ -58,7 +59,7 @@ fn azimuth_turns_from_the_front_to_the_left_and_elevation_towards_the_head() {
 
 #[test]
 fn one_direction_suits_all_sizes() {
-    for model in needlebench_cell::phantom::SIZE_PRESETS {
+    for model in needlebench_phantom::SIZE_PRESETS {
         let goal = "lesion = \"pleural_based\"\nentry_direction_deg = [-90, 0]";
         let resolved = resolve(model, goal).unwrap();
         let (entry, target, _) = needle(&resolved);

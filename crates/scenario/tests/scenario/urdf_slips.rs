@@ -1,10 +1,12 @@
 //! Slips in a URDF that a reader which skips what it does not know would turn into zeros.
 
-use needlebench_cell::{Finding, Overrides, Robot, load_robot};
+use needlebench_input::Finding;
+use needlebench_robot::LoadedRobot;
+use needlebench_scenario::{Overrides, load_robot};
 
 const ARM: &str = include_str!("foreign_urdf/arm.urdf");
 
-fn load(urdf: &str) -> Result<Robot, Finding> {
+fn load(urdf: &str) -> Result<LoadedRobot, Finding> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("arm.urdf");
     std::fs::write(&file, urdf).unwrap();
@@ -99,7 +101,7 @@ fn what_other_programs_read_is_left_to_them() {
         "<!-- more of the upper arm -->",
         "<gazebo><mu1>0.2</mu1></gazebo><drake:x xmlns:drake=\"http://drake.mit.edu\"/>",
     );
-    let notes = load(&quiet).unwrap().notes;
+    let notes = load(&quiet).unwrap().description.notes;
     assert!(
         !notes.iter().any(|note| note.contains("unknown")),
         "{notes:?}"
@@ -113,7 +115,7 @@ fn what_other_programs_read_is_left_to_them() {
         .position(|line| line.contains("paint_code"))
         .unwrap()
         + 1;
-    let notes = load(&odd).unwrap().notes;
+    let notes = load(&odd).unwrap().description.notes;
     let note = notes.iter().find(|note| note.contains("<paint_code>"));
     let note = note.unwrap_or_else(|| panic!("{notes:?}"));
     says(
@@ -121,7 +123,7 @@ fn what_other_programs_read_is_left_to_them() {
         &[
             &format!("arm.urdf:{line}:"),
             "link 'upper_arm_link'",
-            "not read",
+            "which is ignored",
         ],
     );
 }
@@ -133,21 +135,21 @@ fn numbers_are_counted_and_read_as_such() {
     for (to, what) in [
         (
             r#"<origin xyz="0 0 x 0.1219""#,
-            "has 'x', which is no number",
+            "has 'x', which is not a number",
         ),
         (r#"<origin xyz="0 0.1219""#, "needs 3 numbers"),
         (r#"<origin xyz="0 0 0.1219 0""#, "more than 3 numbers"),
         (r#"<origin xyz="0 0 inf""#, "has inf, which is not finite"),
         (
             r#"<origin xyz="0 0 0,1219""#,
-            "has '0,1219', which is no number",
+            "has '0,1219', which is not a number",
         ),
     ] {
         says(&refused(origin, to), &[what]);
     }
     says(
         &refused(r#"<sphere radius="0.03"/>"#, r#"<sphere radius="-0.03"/>"#),
-        &["`radius` of <sphere> is -0.03, but has to be positive"],
+        &["`radius` of <sphere> is -0.03, but must be positive"],
     );
 }
 
@@ -238,7 +240,7 @@ fn elements_are_there_as_often_as_they_should_be() {
         .to_string();
     says(
         &finding,
-        &["<cone> is no geometry", "box, cylinder, sphere or mesh"],
+        &["<cone> is not a geometry", "box, cylinder, sphere or mesh"],
     );
 }
 

@@ -9,9 +9,12 @@ use std::fs;
 use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
-use needlebench_cell::{Finding, MissingInertia, Overrides, PackagePaths, Robot, load_robot};
+use needlebench_cell::Robot;
 use needlebench_geometry::{Shape, TriangleMesh};
+use needlebench_input::{Finding, PackagePaths};
 use needlebench_kinematics::{Body, Dynamics, Joints, Pose, UrGeometry, rotation_angle_between};
+use needlebench_robot::{LoadedRobot, MissingInertia};
+use needlebench_scenario::{Overrides, load_robot};
 
 const ARM: &str = include_str!("foreign_urdf/arm.urdf");
 
@@ -60,12 +63,12 @@ impl Files {
         }
     }
 
-    fn load(&self) -> Result<Robot, Finding> {
+    fn load(&self) -> Result<LoadedRobot, Finding> {
         load_robot(&self.overrides())
     }
 }
 
-fn arm() -> Robot {
+fn arm() -> LoadedRobot {
     Files::new(ARM).load().unwrap()
 }
 
@@ -168,8 +171,8 @@ fn assert_is_the_box(mesh: &TriangleMesh) {
 }
 
 #[track_caller]
-fn assert_noted(robot: &Robot, text: &str) {
-    let notes = &robot.notes;
+fn assert_noted(robot: &LoadedRobot, text: &str) {
+    let notes = &robot.description.notes;
     assert!(notes.iter().any(|note| note.contains(text)), "{notes:?}");
 }
 
@@ -234,7 +237,10 @@ fn a_joint_without_end_has_no_position_limits() {
 fn what_stands_above_base_link_stays_beside_it() {
     let robot = arm();
     assert_eq!(robot.world_from_base_link, Pose::identity());
-    assert_noted(&robot, "where 'world' has it in the URDF does not count");
+    assert_noted(
+        &robot,
+        "its pose relative to 'world' in the URDF is ignored",
+    );
     // The plate is not turned in the file's world, in which base_link is, by 0.6 rad.
     let plate = robot.base.solids.iter().find(
         |solid| matches!(&solid.shape, Shape::Cuboid { half_extents_m } if half_extents_m.x == 0.1),
@@ -248,14 +254,11 @@ fn what_stands_above_base_link_stays_beside_it() {
 #[test]
 fn limits_that_are_not_a_ur3s_are_told() {
     let robot = arm();
-    assert_noted(
-        &robot,
-        "effort limits are used: 61, 62, 33, 14, 13, 12.5 N m",
-    );
+    assert_noted(&robot, "effort limits used: 61, 62, 33, 14, 13, 12.5 N m");
     assert_noted(&robot, "the shipped UR3's are 56, 56, 28, 12, 12, 12");
     assert_noted(
         &robot,
-        "velocity limits are used: 2.9, 2.8, 2.7, 6.1, 6, 5.9 rad/s",
+        "velocity limits used: 2.9, 2.8, 2.7, 6.1, 6, 5.9 rad/s",
     );
 }
 
@@ -312,7 +315,7 @@ fn a_link_whose_visual_is_collada_is_drawn_as_its_collision_geometry() {
     let robot = Files::new(&text).load().unwrap();
     assert_noted(
         &robot,
-        "left out of pictures, which show its collision geometry",
+        "omitted from images, which show its collision geometry instead",
     );
     let visuals = &robot.links[4].visuals;
     assert_eq!(
@@ -496,13 +499,13 @@ fn a_joint_name_is_not_given_twice() {
     let text = changed(r#"<transmission name="pan">"#, again);
     let finding = Files::new(&text).load().unwrap_err().to_string();
     assert!(
-        finding.contains("joint 'elbow_joint' is there twice"),
+        finding.contains("duplicate joint 'elbow_joint'"),
         "{finding}"
     );
 }
 
 /// The shipped arm's file with other collision shapes.
-fn shipped(arm: &str, change: impl Fn(&str) -> String) -> Result<Robot, Finding> {
+fn shipped(arm: &str, change: impl Fn(&str) -> String) -> Result<LoadedRobot, Finding> {
     let path = format!(
         "{}/../../models/{arm}/{arm}.urdf",
         env!("CARGO_MANIFEST_DIR")
@@ -575,7 +578,7 @@ fn a_known_arm_without_shapes_is_as_large_as_it_is() {
                 "{arm}, {index}: {:?}",
                 robot.unseen
             );
-            assert_noted(&robot, "stand for it");
+            assert_noted(&robot, "are added to it");
             for (own, known) in reaches(&robot).iter().zip(&whole) {
                 assert!(own >= &(known - 1e-6), "{arm}, {index}: {own} {known}");
             }
@@ -587,8 +590,12 @@ fn a_known_arm_without_shapes_is_as_large_as_it_is() {
 fn shapes_that_fill_their_links_stay_as_they_are() {
     for arm in ["ur3", "ur3e", "ur5e"] {
         let robot = shipped(arm, str::to_owned).unwrap();
-        let told = robot.notes.iter().any(|note| note.contains("stand for it"));
-        assert!(!told, "{:?}", robot.notes);
+        let told = robot
+            .description
+            .notes
+            .iter()
+            .any(|note| note.contains("are added to it"));
+        assert!(!told, "{:?}", robot.description.notes);
     }
 }
 
@@ -631,12 +638,12 @@ fn a_prefix_is_taken_off_and_told() {
         text
     };
     let robot = shipped("ur3e", prefixed).unwrap();
-    assert_noted(&robot, "without their prefix `left_`");
+    assert_noted(&robot, "prefix `left_` removed");
     assert_eq!(robot.chain, shipped("ur3e", str::to_owned).unwrap().chain);
 }
 
 /// A file with two UR3e, or with the prefix of one of them.
-fn two_arms(prefix: Option<&str>) -> Result<Robot, Finding> {
+fn two_arms(prefix: Option<&str>) -> Result<LoadedRobot, Finding> {
     let path = format!("{}/../../models/ur3e/ur3e.urdf", env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(path).unwrap();
     let (start, end) = (text.find("<link").unwrap(), text.find("</robot>").unwrap());
@@ -676,17 +683,14 @@ fn of_two_arms_one_is_said_and_the_other_stands_still() {
         "{finding}"
     );
     let finding = two_arms(Some("middle_")).unwrap_err().to_string();
-    assert!(
-        finding.contains("there is `left_` and `right_`"),
-        "{finding}"
-    );
+    assert!(finding.contains("`left_` and `right_`"), "{finding}");
     let single = shipped("ur3e", str::to_owned).unwrap();
     let mut bases = Vec::new();
     for prefix in ["left_", "right_"] {
         let robot = two_arms(Some(prefix)).unwrap();
         assert_eq!(robot.chain, single.chain);
-        assert_noted(&robot, &format!("without their prefix `{prefix}`"));
-        assert_noted(&robot, "taken to stand still at 0");
+        assert_noted(&robot, &format!("prefix `{prefix}` removed"));
+        assert_noted(&robot, "fixed at 0");
         // The other arm is of the base, as far away as the file has it.
         assert!(robot.base.solids.len() >= single.base.solids.len() + 6);
         bases.push(reaches(&robot));
@@ -716,7 +720,7 @@ fn a_mass_alone_is_a_points_and_moments_alone_are_nobodys() {
     let whole = shipped("ur3", str::to_owned).unwrap();
     for (tag, lacks, told) in [
         ("inertia", "no moment of inertia", "it is a point mass"),
-        ("mass", "no mass", "has no <mass>, and does not count"),
+        ("mass", "no mass", "has no <mass> and is ignored"),
     ] {
         let change = |text: &str| single(text, tag);
         let finding = given(None, &change).unwrap_err().to_string();
@@ -807,7 +811,7 @@ fn formats_that_are_not_read_are_named() {
         ("box.ply", "a PLY file"),
         ("b.GLB", "a glTF file"),
         ("b.step", "a STEP file"),
-        ("b", "no file of a mesh"),
+        ("b", "not a mesh file"),
     ] {
         let files = Files::new(&collision_mesh(
             &format!("package://my-robot/meshes/{name}"),
@@ -841,7 +845,7 @@ fn names_of_meshes_are_uris() {
         finding
             .unwrap_err()
             .message
-            .contains("`https://` is no place")
+            .contains("`https://` is not supported")
     );
 }
 
@@ -904,7 +908,7 @@ fn another_makers_arm_is_called_that() {
     };
     let finding = shipped("ur3e", kuka).unwrap_err().to_string();
     assert!(
-        finding.contains("no UR arm") && finding.contains("Universal Robots"),
+        finding.contains("not a UR arm") && finding.contains("Universal Robots"),
         "{finding}"
     );
 }

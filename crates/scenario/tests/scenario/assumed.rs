@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use needlebench_cell::{Overrides, ResolvedScenario, resolve_scenario};
+use needlebench_scenario::{Overrides, ResolvedScenario, resolve_scenario};
 
 const GOAL: &str = "[[goals]]\nlesion = \"right_upper_lobe\"\nentry_direction_deg = [-61, -1]\n";
 

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use needlebench_cell::{
-    Change, Finding, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, resolve_scenario,
+use needlebench_input::Finding;
+use needlebench_scenario::{
+    Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, resolve_scenario,
 };
 
 fn scenarios() -> PathBuf {
@@ -34,12 +35,12 @@ fn layouts_that_cannot_exist_are_refused_at_the_key_that_places_them() {
         (
             vec![(BASE, "[-280, 350, -1050]")],
             base,
-            "mm under the floor",
+            "mm below the floor",
         ),
         (
             vec![(BASE, "[-280, 350, -30]"), ("[mount]", "")],
             base,
-            "mm under the floor",
+            "mm below the floor",
         ),
         (
             vec![(BASE, "[-280, 5000, 1050]")],
@@ -51,14 +52,22 @@ fn layouts_that_cannot_exist_are_refused_at_the_key_that_places_them() {
             base,
             "m from the robot's base",
         ),
-        (vec![(BASE, "[-700, 0, 1050]")], base, "mount.column goes"),
-        (vec![(BASE, "[0, 0, 1500]")], base, "into the table"),
+        (
+            vec![(BASE, "[-700, 0, 1050]")],
+            base,
+            "mount.column overlaps",
+        ),
+        (vec![(BASE, "[0, 0, 1500]")], base, "overlaps the table"),
         (
             vec![(BASE, "[-700, 0, 750]"), ("[mount]", "")],
             base,
-            "inside the table",
+            "overlaps the table",
         ),
-        (vec![(BASE, "[800, 900, 1050]")], base, "into the gantry"),
+        (
+            vec![(BASE, "[800, 900, 1050]")],
+            base,
+            "overlaps the gantry",
+        ),
         (
             vec![
                 (BASE, "[0, 0, 1500]"),
@@ -66,32 +75,32 @@ fn layouts_that_cannot_exist_are_refused_at_the_key_that_places_them() {
                 (PATIENT, "rest_on_table = false\nposition_mm = [0, 0, 950]"),
             ],
             base,
-            "the robot's mount stands",
+            "the robot's mount overlaps",
         ),
         (
             vec![(PATIENT, "rest_on_table = false")],
             patient,
-            "mm under the floor",
+            "mm below the floor",
         ),
         (
             vec![(PATIENT, "rest_on_table = false\nposition_mm = [0, 0, 300]")],
             patient,
-            "lies under the table",
+            "is below the table",
         ),
         (
             vec![(PATIENT, "rest_on_table = false\nposition_mm = [0, 0, 800]")],
             patient,
-            "deep in the table",
+            "overlaps the table",
         ),
         (
             vec![(PATIENT, "position_mm = [0, 0, -60]")],
             patient,
-            "deep in the table",
+            "overlaps the table",
         ),
         (
             vec![(PATIENT, "position_mm = [0, 0, 3000]")],
             patient,
-            "floats 3000 mm over the table",
+            "is 3000 mm above the table without support",
         ),
         (
             vec![(
@@ -99,7 +108,7 @@ fn layouts_that_cannot_exist_are_refused_at_the_key_that_places_them() {
                 "rest_on_table = false\nposition_mm = [0, 4000, 3000]",
             )],
             patient,
-            "over the floor",
+            "above the floor",
         ),
         (
             vec![(
@@ -107,7 +116,7 @@ fn layouts_that_cannot_exist_are_refused_at_the_key_that_places_them() {
                 "rest_on_table = false\nposition_mm = [420, 260, 910]",
             )],
             patient,
-            "inside the gantry's housing",
+            "overlaps the gantry's housing",
         ),
         (
             vec![(GANTRY, "isocentre_mm = [600, 300, 900]")],
@@ -117,7 +126,7 @@ fn layouts_that_cannot_exist_are_refused_at_the_key_that_places_them() {
         (
             vec![(GANTRY, "isocentre_mm = [800, 0, 100]")],
             "gantry.isocentre_mm",
-            "under the floor",
+            "below the floor",
         ),
         (
             vec![(
@@ -125,7 +134,7 @@ fn layouts_that_cannot_exist_are_refused_at_the_key_that_places_them() {
                 "top_height_mm = 300\nthickness_mm = 400",
             )],
             "table.thickness_mm",
-            "under the floor",
+            "below the floor",
         ),
         (
             vec![
@@ -136,7 +145,7 @@ fn layouts_that_cannot_exist_are_refused_at_the_key_that_places_them() {
                 ),
             ],
             "start.joints_deg",
-            "under the floor",
+            "below the floor",
         ),
     ] {
         let findings = changed(&edits).expect_err(words);
@@ -175,24 +184,27 @@ fn layouts_that_are_odd_are_noted() {
     for (edits, words) in [
         (
             vec![("[mount]", "")],
-            "hangs 1050 mm over the floor on nothing",
+            "is 1050 mm above the floor without a [mount]",
         ),
-        (vec![("[mount]", "")], "robot_mount` judges nothing"),
-        (vec![(TABLE, "center_mm = [-950, 0]")], "lie beyond its end"),
+        (vec![("[mount]", "")], "robot_mount` is not evaluated"),
+        (
+            vec![(TABLE, "center_mm = [-950, 0]")],
+            "extend beyond its end",
+        ),
         (
             vec![(PATIENT, "position_mm = [0, 0, 100]")],
-            "100 mm over the table",
+            "100 mm above the table",
         ),
         (
             vec![(GANTRY, "isocentre_mm = [800, 0, 880]")],
-            "20 mm under the floor",
+            "20 mm below the floor",
         ),
         (
             vec![(
                 "role = \"assistant\"\nposition_mm = [-800, 450]",
                 "role = \"assistant\"\nside = \"left\"",
             )],
-            "one inside the other",
+            " overlap, ",
         ),
     ] {
         let resolved = changed(&edits).unwrap_or_else(|found| panic!("{}", found[0]));
@@ -203,7 +215,7 @@ fn layouts_that_are_odd_are_noted() {
         );
     }
     let sound = changed(&[]).unwrap();
-    let words = ["floor", "over the table", "beyond", "nothing"];
+    let words = ["floor", "above the table", "beyond", "support"];
     for note in &sound.notes {
         assert!(!words.iter().any(|word| note.contains(word)), "{note}");
     }

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::{BodyKind, Overrides, ResolvedScenario, load_scenario};
+use needlebench_cell::BodyKind;
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 
 fn shipped(name: &str) -> ResolvedScenario {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");

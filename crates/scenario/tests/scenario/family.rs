@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use needlebench_cell::{
+use needlebench_scenario::{
     Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting, resolve_scenario,
 };
 
@@ -29,7 +29,7 @@ fn from_text(
     name: &str,
     goal: &str,
     edit: impl FnOnce(&mut toml::Table),
-) -> Result<ResolvedScenario, Vec<needlebench_cell::Finding>> {
+) -> Result<ResolvedScenario, Vec<needlebench_input::Finding>> {
     let path = scenario_path(name);
     let text = std::fs::read_to_string(&path).unwrap();
     let mut table: toml::Table = text.parse().unwrap();
@@ -122,7 +122,7 @@ fn many_poses_of_phantom_and_base_are_those_of_their_texts() {
             (Ok(varied), Ok(text)) => same(&varied, text),
             (Err(varied), Err(text)) => {
                 both_impossible += 1;
-                let said = |findings: &[needlebench_cell::Finding]| -> Vec<_> {
+                let said = |findings: &[needlebench_input::Finding]| -> Vec<_> {
                     findings
                         .iter()
                         .map(|each| (each.key.clone(), each.message.clone()))
@@ -184,7 +184,7 @@ fn a_change_is_checked_with_the_name_that_was_meant() {
     let message = refuse("phantom.head_yaw_degrees", number());
     assert!(message.contains("`head_yaw_deg`"), "{message}");
     let message = refuse("phantom.head_yaw_rad", number());
-    assert!(message.contains("The key says the unit"), "{message}");
+    assert!(message.contains("The key states the unit"), "{message}");
     let message = refuse("phantom.position_mm[3]", number());
     assert!(message.contains("it has 3 numbers"), "{message}");
     let message = refuse("goals[0].roll_deg", number());
@@ -194,7 +194,7 @@ fn a_change_is_checked_with_the_name_that_was_meant() {
     let message = refuse("phantom.head_yaw_deg", Change::Set(Setting::from("left")));
     assert!(message.contains("degrees"), "{message}");
     let message = refuse("phantom.breadth_mm", Change::Add(5.0));
-    assert!(message.contains("nothing to add to"), "{message}");
+    assert!(message.contains("no value to add to"), "{message}");
     let message = refuse("tool.urdf", Change::Add(5.0));
     assert!(message.contains("only numbers"), "{message}");
     let message = refuse("tool.needle_gauge", number());
@@ -230,7 +230,7 @@ fn keys_that_the_file_leaves_out_can_be_changed() {
 #[test]
 fn every_section_of_a_scenario_can_be_changed() {
     let suite = family("supine_suite");
-    let schema = needlebench_cell::scenario::scenario_schema();
+    let schema = needlebench_scenario::scenario::scenario_schema();
     for section in schema["properties"].as_object().unwrap().keys() {
         if section == "goals" {
             continue;

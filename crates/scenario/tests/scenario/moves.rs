@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use needlebench_cell::{Change, KeyPath, Overrides, PhantomMove, ScenarioFamily, Setting};
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::{Change, KeyPath, Overrides, PhantomMove, ScenarioFamily, Setting};
 
 /// Of `vary`: what a move gives, or what is wrong with it.
 fn agrees(scenario: &str, changes: &[(KeyPath, Change)], far_mm: f64) -> [u32; 2] {

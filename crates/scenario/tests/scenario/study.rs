@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use needlebench_cell::study::{FactorValues, ResolvedStudy, StudyMode, load_study};
-use needlebench_cell::{Finding, Overrides};
+use needlebench_input::Finding;
+use needlebench_scenario::Overrides;
+use needlebench_scenario::study::{FactorValues, ResolvedStudy, StudyMode, load_study};
 
 fn load(lines: &str) -> Result<ResolvedStudy, Vec<Finding>> {
     load_with(lines, &Overrides::default())
@@ -123,7 +124,7 @@ fn empty_and_contradictory_factors_are_refused() {
         (
             format!("{SHIFT}range = [0, 1]\n"),
             "factors[0].range",
-            "how often",
+            "number of samples",
         ),
         ("factors = []\n".to_owned(), "factors", "length 0"),
         (
@@ -147,7 +148,7 @@ fn empty_and_contradictory_factors_are_refused() {
         (
             format!("{SHIFT}values = [1]\n{SHIFT}values = [2]\n"),
             "factors[1].name",
-            "both called",
+            "both named",
         ),
         (
             format!("engines = [\"rapier\"]\n{SHIFT}values = [1]\n"),

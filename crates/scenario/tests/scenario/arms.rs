@@ -1,12 +1,13 @@
 //! The arms that ship: each loads, moves, and has its data or says what it lacks.
 
 use nalgebra::{Matrix3, Vector3};
-use needlebench_cell::{
-    Arm, Change, KeyPath, Overrides, Recognition, ResolvedScenario, ScenarioFamily, Setting,
-    load_robot, load_scenario,
-};
 use needlebench_kinematics::ik::Kinematics;
 use needlebench_kinematics::{Body, Dynamics, Joints};
+use needlebench_robot::{Arm, Recognition};
+use needlebench_scenario::{
+    Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting, load_robot,
+    load_scenario,
+};
 
 fn named(arm: &str) -> Overrides {
     Overrides {
@@ -38,11 +39,15 @@ fn with_robot(robot: &str, more: &str) -> String {
 fn every_shipped_arm_loads_and_is_its_own() {
     for arm in Arm::shipped() {
         let robot = load_robot(&named(&arm.key)).unwrap();
-        let used = robot.arm.as_ref().unwrap();
+        let used = robot.description.arm.as_ref().unwrap();
         assert_eq!((used.recognition, &used.arm), (Recognition::Own, arm));
-        assert_eq!(robot.arm_name(), arm.data.name);
+        assert_eq!(robot.description.arm_name, arm.data.name);
         let note = format!("arm data: {} (models/{}/arm.toml)", arm.key, arm.key);
-        assert!(robot.notes.contains(&note), "{:?}", robot.notes);
+        assert!(
+            robot.description.notes.contains(&note),
+            "{:?}",
+            robot.description.notes
+        );
         assert!(robot.links.iter().all(|link| !link.solids.is_empty()));
     }
 }
@@ -120,22 +125,20 @@ fn drives_that_are_assumed_are_noted() {
         let resolved = scenario(&with_robot(robot, more)).unwrap();
         let notes = resolved.notes.into_iter();
         notes
-            .filter(|note| note.starts_with("assumed of"))
+            .filter(|note| note.starts_with("assumed for"))
             .collect::<Vec<_>>()
     };
     assert_eq!(
         noted("urdf = \"ur3\"", ""),
         [
-            "assumed of the UR3: rotor inertia and friction (derived from the UR3e, whose were identified \
+            "assumed for the UR3: rotor inertia and friction (derived from UR3e values identified \
           from a recorded run)"
         ]
     );
     let own = "[controller]\narmature_kgm2 = [0.6, 0.6, 0.2, 0.1, 0.1, 0.1]\n";
     assert_eq!(
         noted("urdf = \"ur3\"", own),
-        [
-            "assumed of the UR3: friction (derived from the UR3e, whose were identified from a recorded run)"
-        ]
+        ["assumed for the UR3: friction (derived from UR3e values identified from a recorded run)"]
     );
     assert!(noted("urdf = \"ur3e\"", "").is_empty());
 }
@@ -195,9 +198,9 @@ fn stops_have_the_arms_own_brakes_or_are_refused() {
         );
         match (&arm.data.brakes, scenario(&text)) {
             (Some(brakes), Ok(resolved)) => {
-                let used = resolved.cell.robot.arm.as_ref().unwrap();
+                let used = resolved.robot_description.arm.as_ref().unwrap();
                 assert_eq!(used.brakes().unwrap().file, arm.source.file);
-                let note = format!("the {}'s stops: {}", arm.data.name, brakes.source);
+                let note = format!("stopping data of the {}: {}", arm.data.name, brakes.source);
                 assert!(
                     resolved.notes.iter().any(|each| each.contains(&note)),
                     "{:?}",
@@ -229,17 +232,14 @@ fn an_arm_of_which_nothing_is_known_is_told_so_and_gets_no_other_arms_data() {
         load_scenario(&file, &Overrides::default()).map_err(|findings| findings[0].to_string())
     };
     let resolved = load("").unwrap();
-    assert_eq!(resolved.cell.robot.arm, None);
+    assert_eq!(resolved.robot_description.arm, None);
     let notes = resolved.notes.join("\n");
     assert!(notes.contains("arm data: none"), "{notes}");
     assert!(
         notes.contains("the servo of other_frames is assumed"),
         "{notes}"
     );
-    assert!(
-        notes.contains("it stands at [0.0, 0.0, 800.0] mm"),
-        "{notes}"
-    );
+    assert!(notes.contains("base at [0.0, 0.0, 800.0] mm"), "{notes}");
     for (more, key) in [
         ("[events.stop]\ncategory = 0\n", "events.stop.category"),
         ("[events.stop]\ncategory = 1\n", "events.stop.category"),
@@ -250,7 +250,7 @@ fn an_arm_of_which_nothing_is_known_is_told_so_and_gets_no_other_arms_data() {
     ] {
         let finding = load(more).unwrap_err();
         assert!(finding.contains(key), "{finding}");
-        assert!(finding.contains("has no arm's data"), "{finding}");
+        assert!(finding.contains("no arm data for"), "{finding}");
     }
     load("[events.stop]\ncategory = 2\n").unwrap();
     load("[imperfections.calibration]\narm = \"ur3-1\"\n").unwrap();
@@ -261,7 +261,7 @@ fn an_arm_of_which_nothing_is_known_is_told_so_and_gets_no_other_arms_data() {
     let resolved = load_scenario(&file, &Overrides::default()).unwrap();
     let notes = resolved.notes.join("\n");
     assert!(
-        notes.contains("as named; the URDF's lengths differ from its by up to 12.0 mm"),
+        notes.contains("as named; the URDF's lengths differ from the arm's by up to 12.0 mm"),
         "{notes}"
     );
 }
@@ -285,7 +285,7 @@ fn a_scenario_names_an_arm_by_its_file_alone() {
         let file = folder.path().join("s.toml");
         std::fs::write(&file, with_robot(robot, "")).unwrap();
         let resolved = load_scenario(&file, &Overrides::default()).unwrap();
-        let used = resolved.cell.robot.arm.as_ref().unwrap();
+        let used = resolved.robot_description.arm.as_ref().unwrap();
         assert_eq!(used.arm.data.payload.as_ref().unwrap().kg, 2.0, "{robot}");
         assert_eq!(used.recognition, Recognition::Own);
     }
@@ -317,9 +317,9 @@ fn a_urdf_with_the_lengths_of_a_ur5e_has_a_ur5es_data_and_no_value_of_a_ur3() {
          [imperfections.control]\n",
     )
     .unwrap();
-    let robot = &resolved.cell.robot;
+    let robot = &resolved.robot_description;
     assert_eq!(
-        (robot.name.as_str(), robot.arm_name().as_str()),
+        (resolved.cell.robot.name.as_str(), robot.arm_name.as_str()),
         ("theirs", "UR5e")
     );
     let used = robot.arm.as_ref().unwrap();
@@ -353,7 +353,7 @@ fn a_urdf_with_the_lengths_of_a_ur5e_has_a_ur5es_data_and_no_value_of_a_ur3() {
     let notes = resolved
         .notes
         .iter()
-        .filter(|note| !note.starts_with("assumed of the UR5e"));
+        .filter(|note| !note.starts_with("assumed for the UR5e"));
     let notes = notes.cloned().collect::<Vec<_>>().join("\n").to_lowercase();
     assert!(!notes.contains("ur3"), "{notes}");
     // Its own figures, or a refusal that says why there are none.
@@ -393,7 +393,13 @@ fn nominal_masses_are_those_of_the_arm_that_it_is() {
             assert_eq!(ours.mass_kg, theirs.mass_kg);
         }
         let note = "has no mass: the shipped UR5e's upper_arm is used";
-        assert!(robot.notes.iter().any(|each| each.contains(note)));
+        assert!(
+            robot
+                .description
+                .notes
+                .iter()
+                .any(|each| each.contains(note))
+        );
     }
     let finding = load("error").unwrap_err().to_string();
     assert!(
@@ -425,8 +431,7 @@ fn what_a_scenario_leaves_to_its_arm_can_be_varied() {
     let height_m = resolved.cell.robot.world_from_base_link.translation.z;
     assert!((height_m - 0.85).abs() < 1e-12, "{height_m}");
     let own = resolved
-        .cell
-        .robot
+        .robot_description
         .arm
         .as_ref()
         .unwrap()
@@ -439,7 +444,7 @@ fn what_a_scenario_leaves_to_its_arm_can_be_varied() {
     assert_eq!(resolved.servo.stiffness_nm_rad, wanted);
     let other = ("robot.urdf", Change::Set(Setting::from("ur5e")));
     let resolved = vary("urdf = \"ur3\"", std::slice::from_ref(&other)).unwrap();
-    assert_eq!(resolved.cell.robot.arm_name(), "UR5e");
+    assert_eq!(resolved.robot_description.arm_name, "UR5e");
     assert_eq!(
         resolved.servo.stiffness_nm_rad,
         own.unwrap().stiffness_nm_rad

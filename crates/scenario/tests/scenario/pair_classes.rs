@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use needlebench_cell::{
-    Cell, LeftOut, Overrides, PairRule, Srdf, load_scenario, pair_rule, place_in_chain,
-};
+use needlebench_cell::{Cell, LeftOut, PairRule, pair_rule, place_in_chain};
+use needlebench_robot::Srdf;
+use needlebench_scenario::{Overrides, load_robot, load_scenario};
 
 /// A scenario with everything that a cell can have.
 fn cell() -> Cell {
@@ -106,7 +106,13 @@ fn what_is_left_out_shares_a_joint_or_cannot_move() {
 
 #[test]
 fn links_of_an_srdf_are_found_by_the_names_of_the_urdf() {
-    let cell = cell();
+    let (cell, members) = (
+        cell(),
+        load_robot(&Overrides::default())
+            .unwrap()
+            .description
+            .members,
+    );
     let text = r#"<robot name="ur3">
   <disable_collisions link1="base_link_inertia" link2="forearm_link" reason="Never"/>
   <disable_collisions link1="tool0" link2="guide_tube" reason="Adjacent"/>
@@ -115,17 +121,23 @@ fn links_of_an_srdf_are_found_by_the_names_of_the_urdf() {
 </robot>"#;
     let srdf = Srdf::parse("arm.srdf", text).unwrap();
     let names = |pair: usize| {
-        let bodies = srdf.bodies_of(&srdf.disabled[pair], &cell).unwrap();
+        let bodies = srdf
+            .bodies_of(&srdf.disabled[pair], &cell, &members)
+            .unwrap();
         bodies.map(|body| cell.bodies[body].name.as_str())
     };
     assert_eq!(names(0), ["base", "forearm"]);
     assert_eq!(names(1), ["wrist_3", "guide_tube"]);
-    let unknown = srdf.bodies_of(&srdf.disabled[2], &cell).unwrap_err();
+    let unknown = srdf
+        .bodies_of(&srdf.disabled[2], &cell, &members)
+        .unwrap_err();
     assert_eq!(unknown.line, Some(4));
     assert_eq!(
         unknown.hint.as_deref(),
         Some("did you mean 'forearm_link'?")
     );
-    let foreign = srdf.bodies_of(&srdf.disabled[3], &cell).unwrap_err();
+    let foreign = srdf
+        .bodies_of(&srdf.disabled[3], &cell, &members)
+        .unwrap_err();
     assert!(foreign.message.contains("left_finger"), "{foreign}");
 }

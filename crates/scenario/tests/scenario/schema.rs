@@ -1,8 +1,8 @@
 //! The published schemas and the reader of files: what one refuses the other refuses.
 
-use needlebench_cell::Finding;
-use needlebench_cell::scenario::{parse_scenario, scenario_schema};
-use needlebench_cell::study::{parse_study, study_schema};
+use needlebench_input::Finding;
+use needlebench_scenario::scenario::{parse_scenario, scenario_schema};
+use needlebench_scenario::study::{parse_study, study_schema};
 use serde_json::Value;
 
 use crate::schema_probes::{Probe, probes};
@@ -167,10 +167,7 @@ fn shipped_names_are_in_the_schema() {
         ["inline", "offset", "perpendicular", "parametric"]
     );
     let models = of("PhantomSection", "model");
-    for name in needlebench_cell::phantom::SIZE_PRESETS
-        .iter()
-        .chain(&["none"])
-    {
+    for name in needlebench_phantom::SIZE_PRESETS.iter().chain(&["none"]) {
         assert!(models.contains(name), "{name}");
     }
     let lesions = of("GoalSection", "lesion");

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use needlebench_cell::phantom::SIZE_PRESETS;
-use needlebench_cell::{BodyKind, Finding, Overrides, ResolvedScenario, resolve_scenario};
+use needlebench_cell::BodyKind;
 use needlebench_geometry::{PreparedShape, Shape, Solid, separation};
+use needlebench_input::Finding;
+use needlebench_phantom::SIZE_PRESETS;
+use needlebench_scenario::{Overrides, ResolvedScenario, resolve_scenario};
 
 /// Rounding of a metre, through a rotation.
 const ROUNDING_M: f64 = 1e-9;
@@ -153,7 +155,7 @@ fn obstacle_in_an_arm_is_refused() {
     assert!(obstacle(-320.0).is_ok());
     let findings = obstacle(-220.0).unwrap_err();
     assert!(
-        findings[0].message.contains("into the patient"),
+        findings[0].message.contains("overlaps the patient"),
         "{findings:?}"
     );
 }
@@ -162,7 +164,7 @@ fn obstacle_in_an_arm_is_refused() {
 fn standing_chest_on_a_table_is_noted_with_the_lying_one() {
     let notes = |phantom: &str| resolve(phantom).unwrap().notes.join("\n");
     let said = notes("model = \"male-p95\"");
-    assert!(said.contains("measured in people standing"), "{said}");
+    assert!(said.contains("measured on people standing"), "{said}");
     assert!(said.contains("`male-p95-supine`"), "{said}");
     assert!(!notes("model = \"male-p95-supine\"").contains("standing"));
     assert!(!notes("model = \"male-p95\"\nbreadth_mm = 360\ndepth_mm = 250").contains("standing"));

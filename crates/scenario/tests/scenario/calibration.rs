@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix4, Translation3, UnitQuaternion, Vector3};
-use needlebench_cell::{
-    Calibration, Finding, MOVING_LINK_LABELS, Overrides, load_robot, load_scenario,
-};
+use needlebench_input::Finding;
 use needlebench_kinematics::{Joints, Pose, UrModel, base_from_base_link, rotation_angle_between};
+use needlebench_robot::{Calibration, MOVING_LINK_LABELS};
+use needlebench_scenario::{Overrides, load_robot, load_scenario};
 
 /// A UR3 whose file writes the identity as three half turns.
 const HALF_TURNS: &str = include_str!("calibration/ur3_half_turns.yaml");
@@ -22,7 +22,7 @@ const ROUNDING: f64 = 2e-15;
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/cell/calibration")
+        .join("tests/scenario/calibration")
         .join(name)
 }
 
@@ -159,16 +159,16 @@ fn calibration_replaces_the_joint_origins_and_nothing_else() {
     assert_eq!(robot.links, nominal.links);
     assert_eq!(robot.bodies, nominal.bodies);
     assert_eq!(robot.limits, nominal.limits);
-    assert_eq!(robot.source, nominal.source);
-    let applied = robot.calibration.unwrap();
+    assert_eq!(robot.description.source, nominal.description.source);
+    let applied = robot.description.calibration.unwrap();
     assert_eq!(applied.hash.as_deref(), Some("calib_336188160809596540"));
     assert_eq!(applied.source.file, path.display().to_string());
     assert_eq!(
         applied.source.sha256,
-        needlebench_cell::sha256_hex(HALF_TURNS.as_bytes())
+        needlebench_input::sha256_hex(HALF_TURNS.as_bytes())
     );
-    assert!(nominal.calibration.is_none());
-    let note = robot.notes.last().unwrap();
+    assert!(nominal.description.calibration.is_none());
+    let note = robot.description.notes.last().unwrap();
     assert!(note.contains("calib_336188160809596540"), "{note}");
 }
 
@@ -213,6 +213,36 @@ fn calibration_of_a_relative_is_refused_with_the_arm_it_is_of() {
     );
 }
 
+/// What is said of a UR3e's calibration whose frames are turned, which is like no other arm's.
+fn hint_on_turned_frames(calibration: &Calibration) -> String {
+    let geometry = UrModel::Ur3e.geometry();
+    let finding = calibration.chain_of("UR3e", &geometry).unwrap_err();
+    assert!(!finding.message.contains("most like"), "{finding}");
+    finding.hint.unwrap()
+}
+
+/// A calibration with the poses that a hint offers.
+fn mended(calibration: &Calibration, hint: &str) -> Calibration {
+    let (_, offered) = hint.split_once("frames has ").unwrap();
+    let mut mended = calibration.clone();
+    for block in offered.split("; ") {
+        let (link, pose) = block.split_once(": ").unwrap();
+        let at = MOVING_LINK_LABELS
+            .iter()
+            .position(|name| *name == link)
+            .unwrap();
+        let numbers: Vec<f64> = pose
+            .split(", ")
+            .map(|each| each.split_once(": ").unwrap().1.parse().unwrap())
+            .collect();
+        mended.origins[at] = Pose::from_parts(
+            Translation3::new(numbers[0], numbers[1], numbers[2]),
+            UnitQuaternion::from_euler_angles(numbers[3], numbers[4], numbers[5]),
+        );
+    }
+    mended
+}
+
 /// A frame that is turned about its own axis and turned back by the next origin is the same arm: the poses that are
 /// offered in its place are that arm's, in ROS's frames.
 #[test]
@@ -225,11 +255,7 @@ fn frames_turned_about_their_axes_are_named_and_the_equivalent_is_offered() {
         let next = &mut chain.joints[joint + 1].parent_from_joint;
         *next = Pose::from_parts(Translation3::identity(), turn.inverse()) * *next;
         let turned = read(&Calibration::written(&chain, "turned"));
-        let finding = turned
-            .chain_of("UR3e", &UrModel::Ur3e.geometry())
-            .unwrap_err();
-        assert!(!finding.message.contains("most like"), "{finding}");
-        let hint = finding.hint.unwrap();
+        let hint = hint_on_turned_frames(&turned);
         let said = format!("{}'s by ", MOVING_LINK_LABELS[joint]);
         let degrees: f64 = hint
             .split_once(&said)
@@ -245,29 +271,45 @@ fn frames_turned_about_their_axes_are_named_and_the_equivalent_is_offered() {
             "{hint}"
         );
         // What is offered is accepted in the place of what is there, and moves the flange nowhere.
-        let (_, offered) = hint.split_once("frames has ").unwrap();
-        let mut mended = turned.clone();
-        for block in offered.split("; ") {
-            let (link, pose) = block.split_once(": ").unwrap();
-            let at = MOVING_LINK_LABELS
-                .iter()
-                .position(|name| *name == link)
-                .unwrap();
-            let numbers: Vec<f64> = pose
-                .split(", ")
-                .map(|each| each.split_once(": ").unwrap().1.parse().unwrap())
-                .collect();
-            mended.origins[at] = Pose::from_parts(
-                Translation3::new(numbers[0], numbers[1], numbers[2]),
-                UnitQuaternion::from_euler_angles(numbers[3], numbers[4], numbers[5]),
-            );
-        }
+        let mended = mended(&turned, &hint);
         let mended = mended.chain_of("UR3e", &UrModel::Ur3e.geometry()).unwrap();
         let q = Joints::new(0.4, -1.3, 1.1, 0.7, -0.9, 2.0);
         let [a, b] = [&mended, &chain].map(|chain| chain.base_link_from_flange(&q));
         assert!(
             (a.to_homogeneous() - b.to_homogeneous()).amax() < 1e-12,
             "{joint}"
+        );
+    }
+}
+
+/// Frames that are turned and not turned back: the joints' zeros are shifted, and the same links with ROS's zeros are
+/// offered.
+#[test]
+fn frames_that_shift_a_joints_zero_are_named_with_the_arm_without_them() {
+    let usual = read(UR3E).chain();
+    let half = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+    for joints in [&[2, 3][..], &[2], &[0, 1, 4]] {
+        let mut chain = usual;
+        for &joint in joints {
+            chain.joints[joint].parent_from_joint.rotation *= half;
+        }
+        let turned = read(&Calibration::written(&chain, "turned"));
+        let hint = hint_on_turned_frames(&turned);
+        let mended = mended(&turned, &hint);
+        let mended = mended.chain_of("UR3e", &UrModel::Ur3e.geometry()).unwrap();
+        let mut q = Joints::new(0.4, -1.3, 1.1, 0.7, -0.9, 2.0);
+        let a = mended.base_link_from_flange(&q);
+        for &joint in joints {
+            assert!(
+                hint.contains(&format!("{}'s by ", MOVING_LINK_LABELS[joint])),
+                "{hint}"
+            );
+            q[joint] -= std::f64::consts::PI;
+        }
+        let b = chain.base_link_from_flange(&q);
+        assert!(
+            (a.to_homogeneous() - b.to_homogeneous()).amax() < 1e-12,
+            "{joints:?}"
         );
     }
 }
@@ -405,7 +447,7 @@ fn files_that_cannot_be_read_are_refused() {
     let path = folder.path().join("c.yaml");
     std::fs::write(&path, [0xff, 0xfe, 0x00]).unwrap();
     let finding = load_robot(&calibrated(path)).unwrap_err();
-    assert!(finding.message.contains("no UTF-8"), "{finding}");
+    assert!(finding.message.contains("not UTF-8"), "{finding}");
 }
 
 #[test]
