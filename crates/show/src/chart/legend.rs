@@ -20,7 +20,7 @@ pub enum Sample {
 }
 
 /// Distance of rows, px.
-pub(crate) const ROW_PX: f64 = 22.0;
+pub const LEGEND_ROW_PX: f64 = 22.0;
 /// Length of a sample, and space after it and after the text, px.
 const SAMPLE_PX: f64 = 26.0;
 const GAPS_PX: [f64; 2] = [7.0, 22.0];
@@ -37,7 +37,7 @@ pub fn legend<'a>(
     for (sample, text) in entries {
         let length = SAMPLE_PX + GAPS_PX[0] + Size::Small.width(text);
         if x > left && x + length > left + width {
-            (x, y, rows) = (left, y + ROW_PX, rows + 1);
+            (x, y, rows) = (left, y + LEGEND_ROW_PX, rows + 1);
         }
         draw(chart, sample, [x, y]);
         chart.write(Anchor::Start, [x + SAMPLE_PX + GAPS_PX[0], y], text);
@@ -47,7 +47,7 @@ pub fn legend<'a>(
 }
 
 /// The same in a column, without a limit of width.
-pub(crate) fn legend_column<'a>(
+pub fn legend_column<'a>(
     chart: &mut Chart,
     [left, middle]: [f64; 2],
     entries: impl IntoIterator<Item = (Sample, &'a str)>,
@@ -55,7 +55,7 @@ pub(crate) fn legend_column<'a>(
     for (row, entry) in entries.into_iter().enumerate() {
         legend(
             chart,
-            [left, middle + ROW_PX * row as f64],
+            [left, middle + LEGEND_ROW_PX * row as f64],
             f64::INFINITY,
             [entry],
         );

@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::drawing::{Anchor, Chart, Mark, Size};
-use super::legend::{ROW_PX as LEGEND_PX, Sample, legend};
+use super::legend::{LEGEND_ROW_PX, Sample, legend};
 use super::marker::Marker;
 use super::paint::{Paint, Stroke};
 use super::panel::Panel;
@@ -27,7 +27,7 @@ fn head(chart: &mut Chart, left: f64, entries: &[Entry<'_>]) -> f64 {
         .iter()
         .map(|(paint, marker, text)| (Sample::Marker(*marker, *paint), *text));
     let rows = legend(chart, [left, 14.0], width, entries);
-    14.0 + LEGEND_PX * rows as f64
+    14.0 + LEGEND_ROW_PX * rows as f64
 }
 
 /// A curve with marks.
@@ -219,7 +219,6 @@ pub fn dot_plot(title: &str, rows: &[DotRow], axis: Axis, entries: &[Entry<'_>])
 
 #[cfg(test)]
 mod tests {
-    use super::super::drawing::tests::assert_legible;
     use super::*;
     use crate::number::power_of_ten;
 
@@ -254,7 +253,7 @@ mod tests {
         };
         let steps = Axis::linear("steps", 0.0, 4.0);
         let chart = curve_plot("title", &[curve], steps, decades(), &NAMES);
-        assert_legible(&chart);
+        assert_eq!(chart.illegible(), None);
         assert!(
             chart
                 .to_inline_svg()
@@ -276,7 +275,7 @@ mod tests {
             "",
             Axis::percent("share (%)", 1.0),
         );
-        assert_legible(&chart);
+        assert_eq!(chart.illegible(), None);
 
         let rows: Vec<DotRow> = ["short", "quite a long name of a row"]
             .map(|label| DotRow {
@@ -290,6 +289,9 @@ mod tests {
                 }],
             })
             .into();
-        assert_legible(&dot_plot("title", &rows, decades(), &NAMES));
+        assert_eq!(
+            dot_plot("title", &rows, decades(), &NAMES).illegible(),
+            None
+        );
     }
 }

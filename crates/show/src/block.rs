@@ -2,8 +2,8 @@
 
 use comfy_table::{Cell, CellAlignment};
 
-use super::plain_table;
 use crate::layout;
+use crate::table::plain_table;
 
 /// One part of a document.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,12 +38,12 @@ impl Block {
 const KINDS: [char; 2] = ['<', '$'];
 
 /// The heading of a column, without what it says of its cells.
-pub(crate) fn heading(header: &str) -> &str {
+pub fn heading(header: &str) -> &str {
     header.trim_start_matches(KINDS)
 }
 
 /// Whether a column has words, which begin at its left.
-pub(crate) fn has_words(at: usize, header: &str) -> bool {
+pub fn has_words(at: usize, header: &str) -> bool {
     at == 0 || header.starts_with(KINDS)
 }
 

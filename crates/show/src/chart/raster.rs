@@ -1,14 +1,13 @@
 //! The back end for pixels.
 
-use needlebench_render::Image;
-use needlebench_render::signed;
+use needlebench_render::{Image, signed};
 
 use super::drawing::{Chart, Mark, Text};
 use super::paint::{Paint, Rgb, Stroke};
 
 impl Chart {
     /// The chart in pixels.
-    pub(crate) fn to_image(&self) -> Image {
+    pub fn to_image(&self) -> Image {
         let [width, height] = self.size.map(whole);
         let mut canvas = Canvas(Image::filled(width, height, Paint::Page.rgb()));
         for (mark, _) in &self.marks {

@@ -160,7 +160,7 @@ impl Chart {
     }
 
     /// Adds a mark that says more to a pointer over it.
-    pub(crate) fn add_with_tip(&mut self, mark: Mark, tip: impl Into<String>) {
+    pub fn add_with_tip(&mut self, mark: Mark, tip: impl Into<String>) {
         self.marks.push((mark, Some(tip.into())));
     }
 
@@ -216,7 +216,7 @@ impl Chart {
     }
 
     /// Writes a title that begins at a point.
-    pub(crate) fn write_large(&mut self, at: [f64; 2], text: impl Into<String>) {
+    pub fn write_large(&mut self, at: [f64; 2], text: impl Into<String>) {
         self.add(Mark::Text(Text {
             at,
             anchor: Anchor::Start,
@@ -227,7 +227,7 @@ impl Chart {
     }
 
     /// Writes a line of text that runs upwards, with its middle at a point.
-    pub(crate) fn write_upwards(&mut self, at: [f64; 2], text: impl Into<String>) {
+    pub fn write_upwards(&mut self, at: [f64; 2], text: impl Into<String>) {
         self.add(Mark::Text(Text {
             at,
             anchor: Anchor::Middle,
@@ -244,28 +244,32 @@ impl Chart {
             _ => None,
         })
     }
+
+    /// Why it cannot be read, if it cannot: nothing is written, or a text leaves the chart or covers another.
+    pub fn illegible(&self) -> Option<String> {
+        let texts: Vec<&Text> = self.texts().filter(|text| !text.text.is_empty()).collect();
+        if texts.is_empty() {
+            return Some("nothing is written".to_owned());
+        }
+        texts.iter().enumerate().find_map(|(index, text)| {
+            let [[left, top], [right, bottom]] = text.corners();
+            let inside =
+                left >= 0.0 && top >= 0.0 && right <= self.size[0] && bottom <= self.size[1];
+            if !inside {
+                return Some(format!("`{}` leaves the chart", text.text));
+            }
+            texts[..index].iter().find_map(|other| {
+                let [[l, t], [r, b]] = other.corners();
+                let apart = right <= l || r <= left || bottom <= t || b <= top;
+                (!apart).then(|| format!("`{}` covers `{}`", text.text, other.text))
+            })
+        })
+    }
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
-
-    /// Asserts that every text is inside the chart and that none covers another.
-    pub(crate) fn assert_legible(chart: &Chart) {
-        let texts: Vec<&Text> = chart.texts().filter(|text| !text.text.is_empty()).collect();
-        assert!(!texts.is_empty(), "nothing is written");
-        for (index, text) in texts.iter().enumerate() {
-            let [[left, top], [right, bottom]] = text.corners();
-            let inside =
-                left >= 0.0 && top >= 0.0 && right <= chart.size[0] && bottom <= chart.size[1];
-            assert!(inside, "`{}` leaves the chart", text.text);
-            for other in &texts[..index] {
-                let [[l, t], [r, b]] = other.corners();
-                let apart = right <= l || r <= left || bottom <= t || b <= top;
-                assert!(apart, "`{}` covers `{}`", text.text, other.text);
-            }
-        }
-    }
 
     fn text(anchor: Anchor, upwards: bool) -> Text {
         Text {

@@ -19,7 +19,7 @@ const MIDDLE: f64 = 0.26;
 
 impl Chart {
     /// The chart as an SVG file that needs nothing else.
-    pub(crate) fn to_svg(&self) -> String {
+    pub fn to_svg(&self) -> String {
         let [width, height] = self.size.map(number);
         let opening = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \

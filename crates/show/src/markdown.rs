@@ -1,12 +1,12 @@
 //! Texts of users in Markdown: as they are written, and neither markup nor HTML.
 
-use needlebench_cell::printable_line;
+use needlebench_input::printable_line;
 
 /// A text within a line: no line ends, no control characters, no emphasis, links, HTML, or cells of tables.
 ///
 /// What means nothing where it stands stays as it is, so that summaries read well unrendered too: `_` within a
 /// word, `<` before a number.
-pub(crate) fn inline(text: &str) -> String {
+pub fn inline(text: &str) -> String {
     let line = printable_line(text);
     let characters: Vec<char> = line.trim().chars().collect();
     let mut escaped = String::with_capacity(line.len());
@@ -32,7 +32,7 @@ pub(crate) fn inline(text: &str) -> String {
 }
 
 /// The same at the beginning of a line, where it must not begin a heading, a list, a quotation or a rule.
-pub(crate) fn paragraph(text: &str) -> String {
+pub fn paragraph(text: &str) -> String {
     let escaped = inline(text);
     let digits = escaped.chars().take_while(char::is_ascii_digit).count();
     let point = escaped[digits..].strip_prefix(['.', ')']);
@@ -47,7 +47,7 @@ pub(crate) fn paragraph(text: &str) -> String {
 }
 
 /// A text as code.
-pub(crate) fn code(text: &str) -> String {
+pub fn code(text: &str) -> String {
     format!("`{}`", printable_line(text).replace('`', "'"))
 }
 

@@ -1,4 +1,4 @@
-//! How wide a text for people may be, and how lines are broken.
+//! Width of text output, and how lines are broken.
 //!
 //! The width belongs to the place that a text is for, a terminal or a log, of which a process has one: the
 //! command line sets it before anything is written.
@@ -6,7 +6,7 @@
 use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Width where nobody knows a better one: a log, a file, a pipe.
+/// Default width: a log, a file, a pipe.
 pub const DEFAULT_WIDTH: usize = 100;
 /// No table or sentence is made narrower than this.
 const LEAST_WIDTH: usize = 40;
@@ -66,7 +66,7 @@ pub fn wrapped(text: &str) -> String {
 }
 
 /// The same for a given width.
-pub(crate) fn wrapped_to(text: &str, width: usize) -> String {
+pub fn wrapped_to(text: &str, width: usize) -> String {
     let lines = text.split('\n').map(|line| {
         if visible(line) <= width || is_assignment(line) {
             line.to_owned()
@@ -112,7 +112,7 @@ fn broken(line: &str, width: usize) -> String {
 
 /// A heading in lines of at most `width` characters as far as its words allow: broken at spaces, and behind
 /// underscores and hyphens.
-pub(crate) fn in_lines(text: &str, width: usize) -> String {
+pub fn in_lines(text: &str, width: usize) -> String {
     let mut lines = vec![String::new()];
     for word in text.split_inclusive([' ', '_', '-']) {
         let last = lines.last_mut().expect("starts with one line");

@@ -129,7 +129,7 @@ impl Axis {
 
 /// 1, 2 or 5 times a power of ten: the smallest with which a range has at most `wanted` steps. 0 for a
 /// range that is none.
-pub(crate) fn round_step(range: f64, wanted: f64) -> f64 {
+pub fn round_step(range: f64, wanted: f64) -> f64 {
     let raw = range / wanted.max(1.0);
     if !(raw > 0.0 && raw.is_finite()) {
         return 0.0;

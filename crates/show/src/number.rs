@@ -1,7 +1,6 @@
 //! Numbers as people read them, in tables, pages and charts alike.
 
-use needlebench_cell::digits_apart;
-use needlebench_evaluation::metric::Show;
+use needlebench_input::digits_apart;
 
 /// A unit of length.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +32,7 @@ const fn unit(name: &'static str, length_m: f64, per_metre: f64) -> LengthUnit {
 
 /// The unit in which lengths up to `largest_m` are read best. Never metres: an arm's lengths are read
 /// in millimetres.
-pub(crate) fn unit_of_length(largest_m: f64) -> LengthUnit {
+pub fn unit_of_length(largest_m: f64) -> LengthUnit {
     let magnitude = largest_m.abs();
     LENGTHS[..4]
         .iter()
@@ -44,7 +43,7 @@ pub(crate) fn unit_of_length(largest_m: f64) -> LengthUnit {
 }
 
 /// A length that may span from picometres to millimetres, with its unit.
-pub(crate) fn small_length(metres: f64) -> String {
+pub fn small_length(metres: f64) -> String {
     let unit = unit_of_length(metres);
     if metres.abs() < unit.length_m {
         return format!("< 1 {}", unit.name);
@@ -53,7 +52,7 @@ pub(crate) fn small_length(metres: f64) -> String {
 }
 
 /// The same; 0 where it is none at all.
-pub(crate) fn small_length_or_zero(metres: f64) -> String {
+pub fn small_length_or_zero(metres: f64) -> String {
     if metres == 0.0 {
         "0".to_owned()
     } else {
@@ -62,7 +61,7 @@ pub(crate) fn small_length_or_zero(metres: f64) -> String {
 }
 
 /// A power of ten of metres, `1 nm` to `100 m`, without decimals.
-pub(crate) fn decade_of_length(power: i32) -> String {
+pub fn decade_of_length(power: i32) -> String {
     let unit = usize::try_from((power + 12).div_euclid(3)).map_or(0, |unit| unit.min(4));
     let unit = LENGTHS[unit];
     let count = 10_f64.powi(power) * unit.per_metre;
@@ -76,7 +75,7 @@ pub fn millimetres(metres: f64) -> String {
 
 /// A value and its limit, both in the same unit that people use; the value with as many digits as show on
 /// which side of its limit it is.
-pub(crate) fn value_and_limit(value: f64, limit: f64, unit: &str) -> (String, String) {
+pub fn value_and_limit(value: f64, limit: f64, unit: &str) -> (String, String) {
     let text = |value: f64| match unit {
         // Limits of accuracy are far below those of clearance.
         "m" if limit != 0.0 && limit.abs() < 1e-3 => small_length(value),
@@ -173,12 +172,12 @@ pub fn percent(share: f64) -> String {
 }
 
 /// A share in per cent with so many decimals.
-pub(crate) fn percent_with(share: f64, decimals: usize) -> String {
+pub fn percent_with(share: f64, decimals: usize) -> String {
     format!("{:.decimals$} %", 100.0 * share)
 }
 
 /// How many per cent a share is, with three digits or fewer.
-pub(crate) fn in_percent(share: f64) -> String {
+pub fn in_percent(share: f64) -> String {
     let value = 100.0 * share;
     if value != 0.0 && value.abs() < 1.0 {
         format!("{value:.2}")
@@ -188,7 +187,7 @@ pub(crate) fn in_percent(share: f64) -> String {
 }
 
 /// A length in mm, or another number, with two or three digits and no power of ten.
-pub(crate) fn three_digits(value: f64) -> String {
+pub fn three_digits(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {
         "0".to_owned()
@@ -225,17 +224,6 @@ pub fn duration(seconds: f64) -> String {
         format!("{:.1} µs", seconds * 1e6)
     } else {
         format!("{:.0} ms", seconds * 1e3)
-    }
-}
-
-/// A metric's value in SI units as tables show it.
-pub fn shown(show: Show, value: f64) -> String {
-    match show {
-        Show::Millimetres => millimetres(value),
-        Show::SmallLength => small_length(value),
-        Show::Seconds | Show::Number => format!("{value:.2}"),
-        Show::Percent => percent_with(value, 0),
-        Show::Degrees => format!("{:.1}", value.to_degrees()),
     }
 }
 
