@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use needlebench_bench::credibility::{Comparison, Credibility, RunEvidence, StepHalving};
+use needlebench_show::markdown::{code, inline, paragraph};
+use needlebench_show::number::{rounded, small_length_or_zero};
 use serde_json::Value;
 
-use crate::markdown::escape::{code, inline, paragraph};
-use crate::number::{rounded, small_length_or_zero};
+use super::{Comparison, Credibility, RunEvidence, StepHalving};
 
 const NOT_STATED: &str = "not stated";
 
@@ -18,7 +18,7 @@ pub fn credibility_markdown(document: &Credibility) -> String {
     out
 }
 
-/// What somebody stated.
+/// A stated text, or that there is none.
 fn stated(text: &str) -> String {
     if text.trim().is_empty() {
         return format!("*{NOT_STATED}*");
@@ -39,7 +39,7 @@ fn write_document(out: &mut String, document: &Credibility) -> std::fmt::Result 
     };
     writeln!(
         out,
-        "Judged by: {}. Date: {}.\n",
+        "Assessed by: {}. Date: {}.\n",
         of(&judgement.author),
         of(&judgement.date)
     )?;
@@ -51,15 +51,9 @@ fn write_document(out: &mut String, document: &Credibility) -> std::fmt::Result 
     }
     writeln!(out, "## 3 Model risk\n")?;
     for (title, text) in [
-        (
-            "Influence of the model on the decision",
-            &judgement.model_influence,
-        ),
-        (
-            "Consequence of a wrong decision",
-            &judgement.decision_consequence,
-        ),
-        ("Risk of the model, from both", &judgement.model_risk),
+        ("Model influence", &judgement.model_influence),
+        ("Decision consequence", &judgement.decision_consequence),
+        ("Model risk", &judgement.model_risk),
     ] {
         writeln!(out, "**{title}:** {}\n", stated(text))?;
     }
@@ -86,10 +80,10 @@ fn code_verification(out: &mut String, document: &Credibility) -> std::fmt::Resu
     writeln!(out, "## 4 Code verification\n")?;
     writeln!(
         out,
-        "Tests of the program that hold a quantity against a closed form or against another program. They \
-         pass before every change of it; this command does not run them.\n"
+        "Tests that compare a quantity with a closed form or another program. They pass before \
+         every change of the program; this command does not run them.\n"
     )?;
-    writeln!(out, "| Quantity | Against | Test |\n|---|---|---|")?;
+    writeln!(out, "| Quantity | Compared with | Test |\n|---|---|---|")?;
     for test in &document.verifying_tests {
         let place = format!("{}: {}", test.file, test.test);
         writeln!(
@@ -100,7 +94,7 @@ fn code_verification(out: &mut String, document: &Credibility) -> std::fmt::Resu
             code(&place)
         )?;
     }
-    writeln!(out, "\nWhat the engines are known to get wrong:\n")?;
+    writeln!(out, "\nKnown deviations of the engines:\n")?;
     for known in &document.known_deviations {
         let text = |key: &str| known.get(key).and_then(Value::as_str).unwrap_or_default();
         writeln!(
@@ -114,7 +108,7 @@ fn code_verification(out: &mut String, document: &Credibility) -> std::fmt::Resu
     }
     writeln!(
         out,
-        "\nJudgement: {}\n",
+        "\nAssessment: {}\n",
         stated(&document.judgement.code_verification)
     )
 }
@@ -122,27 +116,28 @@ fn code_verification(out: &mut String, document: &Credibility) -> std::fmt::Resu
 fn calculation_verification(out: &mut String, document: &Credibility) -> std::fmt::Result {
     writeln!(out, "## 5 Calculation verification\n")?;
     if document.runs.is_empty() {
-        writeln!(out, "There is no run.\n")?;
+        writeln!(out, "No run.\n")?;
     }
     for run in &document.runs {
         let name = inline(&run.name);
         match &run.engines_differ {
             Some(found) => writeln!(
                 out,
-                "- {name}: over {} motions the engines' tips differ by at most {} while moving and {} when settled.",
+                "- {name}: over {} motions, the engines' needle tips differ by at most {} in \
+                 motion and {} when settled.",
                 found.motions,
                 small_length_or_zero(found.peak_tip_m),
                 small_length_or_zero(found.settled_tip_m)
             )?,
             None => writeln!(
                 out,
-                "- {name}: engines were not compared: fewer than two measured the same motion."
+                "- {name}: engines not compared: fewer than two measured the same motion."
             )?,
         }
         if run.step_halving.is_empty() {
             writeln!(
                 out,
-                "- {name}: the time step was not halved: {} does it.",
+                "- {name}: time step not halved; {} halves it.",
                 code("needlebench run SCENARIO --referee")
             )?;
         }
@@ -151,7 +146,7 @@ fn calculation_verification(out: &mut String, document: &Credibility) -> std::fm
         }
     }
     let text = stated(&document.judgement.calculation_verification);
-    writeln!(out, "\nJudgement: {text}\n")
+    writeln!(out, "\nAssessment: {text}\n")
 }
 
 fn step_halving(out: &mut String, name: &str, halving: &StepHalving) -> std::fmt::Result {
@@ -164,7 +159,8 @@ fn step_halving(out: &mut String, name: &str, halving: &StepHalving) -> std::fmt
     };
     write!(
         out,
-        "- {name}: {} beside the referee, worst of {} motions: tips apart by {}",
+        "- {name}: {} compared with the reference integrator, worst of {} motions: tip difference \
+         {}",
         inline(&halving.engine),
         halving.motions,
         steps(&halving.closed_loop_tip_m)
@@ -172,7 +168,7 @@ fn step_halving(out: &mut String, name: &str, halving: &StepHalving) -> std::fmt
     if !halving.held_torques_tip_m.is_empty() {
         write!(
             out,
-            "; under held torques by {}",
+            "; under held torques {}",
             steps(&halving.held_torques_tip_m)
         )?;
     }
@@ -182,7 +178,10 @@ fn step_halving(out: &mut String, name: &str, halving: &StepHalving) -> std::fmt
             "; order of convergence {low:.2} to {high:.2}, documented {}.",
             halving.documented_order
         ),
-        None => writeln!(out, "; no order can be read: the differences are rounding."),
+        None => writeln!(
+            out,
+            "; order of convergence not measurable, differences are rounding errors."
+        ),
     }
 }
 
@@ -191,8 +190,8 @@ fn validation(out: &mut String, document: &Credibility) -> std::fmt::Result {
     if !document.has_comparator() {
         writeln!(
             out,
-            "No comparator: nothing of this has been held against a real arm or any other measurement. \
-             {} holds the model against a recorded run.\n",
+            "No comparator: no result was compared with a real arm or any other measurement. {} \
+             compares the model with a recorded run.\n",
             code("needlebench replay LOG")
         )?;
     }
@@ -213,10 +212,7 @@ fn validation(out: &mut String, document: &Credibility) -> std::fmt::Result {
 }
 
 fn comparison_lines(out: &mut String, comparison: &Comparison) -> std::fmt::Result {
-    let log = comparison
-        .log
-        .as_deref()
-        .unwrap_or("a log that is not named");
+    let log = comparison.log.as_deref().unwrap_or("unnamed log");
     writeln!(
         out,
         "Recorded run {} ({}):\n",
@@ -227,15 +223,18 @@ fn comparison_lines(out: &mut String, comparison: &Comparison) -> std::fmt::Resu
         writeln!(out, "- SHA-256 of the log: {}", code(sha256))?;
     }
     if comparison.simulated_log == Some(true) {
-        writeln!(out, "- the log is a simulator's: it is no comparator")?;
+        writeln!(out, "- log of a simulator, not a comparator")?;
     }
     match comparison.held_out_m {
         Some(held_out_m) => writeln!(
             out,
-            "- rms error of the calibration at poses that were not fitted: {} mm",
+            "- RMS calibration error at held-out poses: {} mm",
             millimetres(held_out_m)
         )?,
-        None => writeln!(out, "- held-out error of a calibration: not measured")?,
+        None => writeln!(
+            out,
+            "- RMS calibration error at held-out poses: not measured"
+        )?,
     }
     match &comparison.held_out_moment_rms_nm {
         Some(Value::Array(joints)) => {
@@ -243,20 +242,20 @@ fn comparison_lines(out: &mut String, comparison: &Comparison) -> std::fmt::Resu
             let joints: Vec<String> = joints.map(|nm| rounded(nm, 5)).collect();
             writeln!(
                 out,
-                "- rms of what the identified model leaves of the joints' torques, in rows that were not \
-                 fitted: {} N m",
+                "- RMS residual of the identified model's joint torques, in held-out rows: {} N m",
                 joints.join(", ")
             )?;
         }
         _ => writeln!(
             out,
-            "- what the identified model leaves of the torques: not measured"
+            "- residual of the identified model's joint torques: not measured"
         )?,
     }
     for (engine, [rms_m, largest_m]) in &comparison.tips_m {
         writeln!(
             out,
-            "- tip in {} from the real one, both by the joint angles: {} mm rms, {} mm at most",
+            "- tip in {} compared with the real tip, both from joint angles: {} mm RMS, {} mm \
+             maximum",
             inline(engine),
             millimetres(*rms_m),
             millimetres(*largest_m)
@@ -286,7 +285,7 @@ fn criteria(out: &mut String, run: &RunEvidence) -> std::fmt::Result {
     )?;
     writeln!(
         out,
-        "Verdict: {}. {} of {} judged criteria met; {} not judged.\n",
+        "Verdict: {}. {} of {} evaluated criteria met; {} not evaluated.\n",
         inline(&run.verdict),
         run.met,
         run.judged,
@@ -301,7 +300,7 @@ fn criteria(out: &mut String, run: &RunEvidence) -> std::fmt::Result {
     for missed in &run.missed {
         writeln!(
             out,
-            "- missed: {} {} {} {}",
+            "- failed: {} {} {} {}",
             text(missed, "goal"),
             text(missed, "label"),
             text(missed, "criterion"),
@@ -311,7 +310,7 @@ fn criteria(out: &mut String, run: &RunEvidence) -> std::fmt::Result {
     for open in &run.not_judged {
         writeln!(
             out,
-            "- not judged: {} {} {}: {}",
+            "- not evaluated: {} {} {}: {}",
             text(open, "goal"),
             text(open, "label"),
             text(open, "criterion"),
@@ -321,13 +320,14 @@ fn criteria(out: &mut String, run: &RunEvidence) -> std::fmt::Result {
     if run.trace.is_empty() {
         return writeln!(
             out,
-            "\nThe scenario names no requirements ({}).\n",
+            "\nThe scenario states no requirements ({}).\n",
             code("[requirements]")
         );
     }
     writeln!(
         out,
-        "\n| Requirement | Criterion | Outcome | Met | Missed | Not judged |\n|---|---|---|--:|--:|--:|"
+        "\n| Requirement | Criterion | Outcome | Met | Failed | Not evaluated \
+         |\n|---|---|---|--:|--:|--:|"
     )?;
     for row in &run.trace {
         let count = |key: &str| row.get(key).and_then(Value::as_u64).unwrap_or_default();
@@ -336,7 +336,7 @@ fn criteria(out: &mut String, run: &RunEvidence) -> std::fmt::Result {
             "| {} | {} | {} | {} | {} | {} |",
             text(row, "requirement"),
             text(row, "criterion"),
-            text(row, "outcome").replace('_', " "),
+            outcome_label(&text(row, "outcome")),
             count("met"),
             count("missed"),
             count("not_judged")
@@ -345,13 +345,22 @@ fn criteria(out: &mut String, run: &RunEvidence) -> std::fmt::Result {
     writeln!(out)
 }
 
+/// What a report calls an outcome, in words.
+fn outcome_label(outcome: &str) -> String {
+    match outcome {
+        "missed" => "failed".to_owned(),
+        "not_judged" => "not evaluated".to_owned(),
+        other => other.replace('_', " "),
+    }
+}
+
 fn limitations(out: &mut String, document: &Credibility) -> std::fmt::Result {
     writeln!(out, "## 9 Limitations and assumptions\n")?;
     writeln!(out, "{}\n", stated(&document.judgement.limitations))?;
     for run in &document.runs {
         let name = inline(&run.name);
         if let Some(truth) = &run.truth {
-            writeln!(out, "- {name}: simulated was {}", inline(truth))?;
+            writeln!(out, "- {name}: simulated: {}", inline(truth))?;
         }
         for failure in &run.engine_failures {
             let text = |key: &str| failure.get(key).and_then(Value::as_str).unwrap_or_default();
@@ -374,7 +383,7 @@ fn limitations(out: &mut String, document: &Credibility) -> std::fmt::Result {
             }
             None => writeln!(
                 out,
-                "- {name}: which values of the arm are assumed is not in its report"
+                "- {name}: the report does not list which values of the arm are assumed"
             )?,
         }
         for note in &run.notes {
@@ -423,7 +432,7 @@ fn provenance(out: &mut String, run: &RunEvidence) -> std::fmt::Result {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_cell::judgement::Judgement;
+    use crate::Judgement;
 
     use super::*;
 
@@ -451,15 +460,15 @@ mod tests {
         assert!(text.contains("claims no conformity"));
         assert_eq!(text.matches("*not stated*").count(), 12, "{text}");
         for part in [
-            "Judged by: not stated",
+            "Assessed by: not stated",
             "No comparator",
-            "the time step was not halved",
+            "time step not halved",
             "rotors.source",
             "assumed: nothing is known",
-            "| SRS-1 \\| tip | c | not judged | 0 | 0 | 1 |",
+            "| SRS-1 \\| tip | c | not evaluated | 0 | 0 | 1 |",
             "| scenario | `s.toml` | `abc` |",
             "\\<b>a note\\</b>",
-            "Verdict: incomplete. 0 of 1 judged criteria met; 1 not judged.",
+            "Verdict: incomplete. 0 of 1 evaluated criteria met; 1 not evaluated.",
         ] {
             assert!(text.contains(part), "no `{part}` in {text}");
         }
@@ -478,9 +487,9 @@ mod tests {
             "identification": {"controller": {"held_out_rms_nm": [0.1, 0.25]}}}"#;
         let text = document(&[("replay.json", replay)], judgement);
         for part in [
-            "Judged by: A. Judge.",
+            "Assessed by: A. Judge.",
             "\\# Does it reach?\n\nAnd how?",
-            "not fitted: 0.082 mm",
+            "at held-out poses: 0.082 mm",
             "0.1, 0.25 N m",
             "`run.csv`",
         ] {

@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct VerifyingTest {
     /// What is computed.
     pub quantity: &'static str,
-    /// What it is held against.
+    /// What it is compared with.
     pub against: &'static str,
     /// File of the test, from the top of the source tree.
     pub file: &'static str,
@@ -32,26 +32,26 @@ const fn test(
 /// The tests, by what they are of. They are run before every change of the program, and not by a run.
 pub(crate) const VERIFYING_TESTS: [VerifyingTest; 16] = [
     test(
-        "free motion in both engines and the referee",
+        "free motion in both engines and the reference integrator",
         "the pendulum in elliptic functions",
         "tests/benchmarks/free_motion.rs",
         "a_pendulum_swings_as_the_elliptic_functions_say",
     ),
     test(
-        "gravity in both engines and the referee",
+        "gravity in both engines and the reference integrator",
         "free fall",
         "tests/benchmarks/free_motion.rs",
         "a_ball_on_a_long_lever_falls_freely",
     ),
     test(
-        "servo in both engines and the referee",
+        "servo in both engines and the reference integrator",
         "the closed form of the sampled loop",
         "tests/benchmarks/servo_step.rs",
         "a_servo_step_is_the_closed_form_of_its_sampling",
     ),
     test(
         "force of a resting contact",
-        "balance of weight and load",
+        "equilibrium of weight and load",
         "tests/benchmarks/contact.rs",
         "a_resting_ball_is_borne_by_its_weight_and_what_presses_it",
     ),
@@ -68,7 +68,7 @@ pub(crate) const VERIFYING_TESTS: [VerifyingTest; 16] = [
         "loader_and_dynamics_agree_with_pinocchio",
     ),
     test(
-        "places of the engines' bodies",
+        "poses of the engines' bodies",
         "forward kinematics",
         "tests/validation/engines/mod.rs",
         "engine_bodies_are_where_forward_kinematics_puts_them",
@@ -80,14 +80,14 @@ pub(crate) const VERIFYING_TESTS: [VerifyingTest; 16] = [
         "gravity_torque_holds_arm_and_tool_still",
     ),
     test(
-        "motions of the shipped scenarios",
-        "rapier and MuJoCo, each other",
+        "motions of the bundled scenarios",
+        "each other (rapier and MuJoCo)",
         "tests/validation/engines/mod.rs",
         "engines_agree_along_every_planned_motion",
     ),
     test(
         "inverse kinematics",
-        "the postures that made the poses, in twice the precision",
+        "the postures that generated the poses, at twice the precision",
         "tests/validation/inverse/mod.rs",
         "every_posture_of_a_fresh_pose_has_a_row_and_every_row_is_right",
     ),
@@ -104,20 +104,20 @@ pub(crate) const VERIFYING_TESTS: [VerifyingTest; 16] = [
         "simulated_error_is_that_of_the_closed_form",
     ),
     test(
-        "bounds on pairs that cannot meet",
+        "bounds on pairs that cannot collide",
         "random postures",
         "crates/clearance/tests/clearance/pairs.rs",
         "random_postures_do_not_refute_what_is_proven",
     ),
     test(
-        "errors of the needle's tip and line",
+        "errors of the needle tip and axis",
         "closed forms of a shifted and a tilted guide",
         "crates/evaluation/tests/evaluation/measurements.rs",
         "a_tilt_about_the_exit_grows_with_the_insertion",
     ),
     test(
-        "angles of the needle in two planes",
-        "turns about the planes' normals",
+        "needle angles in two planes",
+        "rotations about the planes' normals",
         "crates/evaluation/tests/evaluation/measurements.rs",
         "a_turn_about_the_normal_of_a_plane_shows_in_that_plane_as_it_is",
     ),

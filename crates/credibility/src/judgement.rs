@@ -1,5 +1,5 @@
-//! What people state about a simulation's credibility: a TOML file of texts, which the program can print as a
-//! template and never fills in.
+//! Statements of the user on the credibility of a simulation: a TOML file of texts. The program can print a template
+//! and never fills it in.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -7,96 +7,94 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Finding;
-use crate::input::read_text;
-use crate::schema::FileSchema;
-use crate::toml_text::TomlText;
+use needlebench_input::schema::FileSchema;
+use needlebench_input::{Finding, TomlText, read_text};
 
-/// A judgement in the frame of ASME V&V 40. What is empty is not stated.
+/// A credibility assessment in the terms of ASME V&V 40. An empty field is not stated.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Judgement {
-    /// Who judges.
+    /// Author of the judgement.
     pub author: String,
-    /// When, as text.
+    /// Date, as text.
     pub date: String,
-    /// The question that is to be answered, and to which the model contributes.
+    /// Question of interest: the question to which the model contributes an answer.
     pub question_of_interest: String,
-    /// What the model is used for in answering it, and what else the answer rests on.
+    /// Context of use: the role of the model in answering it, and the other evidence used.
     pub context_of_use: String,
-    /// How much the answer rests on the model: low, medium or high, and why.
+    /// Model influence: contribution of the model to the answer, low, medium or high, and why.
     pub model_influence: String,
-    /// How bad a wrong decision would be: low, medium or high, and for whom.
+    /// Decision consequence: severity of a wrong decision, low, medium or high, and for whom.
     pub decision_consequence: String,
-    /// What follows from both for how good the evidence has to be.
+    /// Model risk: the combination of both, and the rigour of evidence that it requires.
     pub model_risk: String,
-    /// What of the code's verification matters here, and whether it is enough.
+    /// Code verification relevant to the context of use, and whether it is sufficient.
     pub code_verification: String,
-    /// The same of the calculation: time step, engines, sampling.
+    /// Calculation verification: time step, engines, sampling, and whether it is sufficient.
     pub calculation_verification: String,
-    /// What the model is held against, and how good that measurement is itself.
+    /// Comparator: the measurement with which the model is compared, and its uncertainty.
     pub comparator: String,
-    /// How well both agree, and whether that is enough.
+    /// Agreement of model and comparator, and whether it is sufficient.
     pub agreement: String,
-    /// How the validation's conditions differ from those of the context of use.
+    /// Applicability: differences between the conditions of the validation and the context of use.
     pub applicability: String,
-    /// What the model leaves out that matters here.
+    /// Limitations: relevant effects that the model neglects.
     pub limitations: String,
-    /// Whether the evidence is enough for the model's risk.
+    /// Adequacy: whether the evidence is sufficient for the model risk.
     pub adequacy: String,
 }
 
-/// Fields with what is to be written into them, in the order of the file.
+/// Fields with their prompts, in the order of the file.
 const FIELDS: [(&str, &str); 14] = [
-    ("author", "Who judges."),
-    ("date", "When, in quotes: \"2026-01-31\"."),
+    ("author", "Author of the judgement."),
+    ("date", "Date, in quotes: \"2026-01-31\"."),
     (
         "question_of_interest",
-        "The question that is to be answered, and to which the model contributes.",
+        "Question of interest: the question to which the model contributes an answer.",
     ),
     (
         "context_of_use",
-        "What the model is used for in answering it, and what else the answer rests on.",
+        "Context of use: the role of the model in answering it, and the other evidence used.",
     ),
     (
         "model_influence",
-        "How much the answer rests on the model: low, medium or high, and why.",
+        "Model influence: contribution of the model to the answer, low, medium or high, and why.",
     ),
     (
         "decision_consequence",
-        "How bad a wrong decision would be: low, medium or high, and for whom.",
+        "Decision consequence: severity of a wrong decision, low, medium or high, and for whom.",
     ),
     (
         "model_risk",
-        "What follows from both for how good the evidence has to be.",
+        "Model risk: the combination of both, and the rigour of evidence that it requires.",
     ),
     (
         "code_verification",
-        "What of the code's verification matters here, and whether it is enough.",
+        "Code verification relevant to the context of use, and whether it is sufficient.",
     ),
     (
         "calculation_verification",
-        "The same of the calculation: time step, engines, sampling.",
+        "Calculation verification: time step, engines, sampling, and whether it is sufficient.",
     ),
     (
         "comparator",
-        "What the model is held against, and how good that measurement is itself.",
+        "Comparator: the measurement with which the model is compared, and its uncertainty.",
     ),
     (
         "agreement",
-        "How well both agree, and whether that is enough.",
+        "Agreement of model and comparator, and whether it is sufficient.",
     ),
     (
         "applicability",
-        "How the comparison's conditions differ from those of the context of use.",
+        "Applicability: differences between the conditions of the comparison and the context of use.",
     ),
     (
         "limitations",
-        "What the model leaves out that matters here.",
+        "Limitations: relevant effects that the model neglects.",
     ),
     (
         "adequacy",
-        "Whether the evidence is enough for the model's risk.",
+        "Adequacy: whether the evidence is sufficient for the model risk.",
     ),
 ];
 
@@ -108,8 +106,8 @@ impl Judgement {
     pub fn load(path: &Path) -> Result<Self, Vec<Finding>> {
         let file = path.display().to_string();
         let text = read_text(path).map_err(|error| {
-            let hint = error.hint("`needlebench report --template` prints one to fill in");
-            vec![Finding::new(&file, format!("the judgement cannot be read: {error}")).hint(hint)]
+            let hint = error.hint("`needlebench report --template` prints a template");
+            vec![Finding::new(&file, format!("cannot read the judgement: {error}")).hint(hint)]
         })?;
         Self::parse(&file, &text)
     }
@@ -122,8 +120,8 @@ impl Judgement {
     /// A file to fill in.
     pub fn template() -> String {
         let mut text = String::from(
-            "# A judgement on the credibility of a simulation, in the frame of ASME V&V 40.\n\
-             # What is left empty is printed as \"not stated\". Longer texts: \"\"\"...\"\"\".\n",
+            "# A credibility assessment of a simulation in the terms of ASME V&V 40.\n\
+             # An empty field is printed as \"not stated\". Longer texts: \"\"\"...\"\"\".\n",
         );
         for (key, what) in FIELDS {
             // Writing to a String cannot fail.

@@ -1,29 +1,33 @@
 //! Evidence for the credibility of runs, in the frame of ASME V&V 40: what the program knows of its results,
 //! beside what people judge. It claims nothing.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
+mod document;
+mod judgement;
 mod verification;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use needlebench_cell::judgement::Judgement;
-use needlebench_cell::{Finding, read_text};
 use needlebench_engine::KNOWN_DEVIATIONS;
 use needlebench_evaluation::StoredReport;
+use needlebench_input::{Finding, read_text};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-pub(crate) use verification::VERIFYING_TESTS;
+pub use document::credibility_markdown;
+pub use judgement::Judgement;
+use verification::VERIFYING_TESTS;
 pub use verification::VerifyingTest;
 
 /// Version of the keys of [`Credibility`].
-pub(crate) const CREDIBILITY_VERSION: u32 = 1;
+const CREDIBILITY_VERSION: u32 = 1;
 
 /// What no such document does.
-pub(crate) const CLAIM: &str = "This document claims no conformity with any standard or guidance. It has the frame of \
-    ASME V&V 40 - question of interest, context of use, model risk, verification, validation, applicability - and \
-    collects evidence in it. What the program knows is filled in by it; what people have to judge is theirs, and \
-    \"not stated\" where nobody said it.";
+const CLAIM: &str = "This document claims no conformity with any standard or guidance. It is structured as ASME \
+     V&V 40 (question of interest, context of use, model risk, verification, validation, \
+     applicability) and collects evidence. The program fills in its own results; assessments are \
+     made by people, and marked \"not stated\" where missing.";
 
 /// A figure that was read from a results folder.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -36,12 +40,12 @@ pub struct EngineAgreement {
     pub settled_tip_m: f64,
 }
 
-/// An engine beside the referee at the scenario's step, its half and its quarter: the worst motion.
+/// An engine compared with the reference integrator at the scenario's step, its half and its quarter: the worst motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepHalving {
     /// The engine.
     pub engine: String,
-    /// Motions that were held against the referee.
+    /// Motions that were compared with the reference integrator.
     pub motions: u64,
     /// Time steps, s.
     pub timesteps_s: Vec<f64>,
@@ -91,8 +95,8 @@ impl Comparison {
         let text = read_text(path)
             .map_err(|error| Finding::new(&file, format!("the replay cannot be read: {error}")))?;
         let value: Value = serde_json::from_str(&text).map_err(|error| {
-            Finding::new(&file, format!("the replay is no JSON: {error}"))
-                .hint("make it anew with `needlebench replay`")
+            Finding::new(&file, format!("the replay is not JSON: {error}"))
+                .hint("recreate it with `needlebench replay`")
         })?;
         let text_at = |pointers: &[&str]| {
             let found = pointers.iter().find_map(|at| value.pointer(at)?.as_str());
@@ -135,23 +139,23 @@ pub struct RunEvidence {
     pub file: String,
     /// `pass`, `fail` or `incomplete`.
     pub verdict: String,
-    /// Criteria that were judged.
+    /// Criteria that were evaluated.
     pub judged: u64,
     /// Those of them that were met.
     pub met: u64,
     /// Those that were missed, as the report has them.
     pub missed: Vec<Value>,
-    /// Those that could not be judged, as the report has them.
+    /// Those that could not be evaluated, as the report has them.
     pub not_judged: Vec<Value>,
     /// Requirements, with what came of their criteria.
     pub trace: Vec<Value>,
     /// How far engines differ; none unless several ran.
     pub engines_differ: Option<EngineAgreement>,
-    /// Engines beside the referee; empty unless it was called.
+    /// Engines compared with the reference integrator; empty unless it was called.
     pub step_halving: Vec<StepHalving>,
     /// Engines that failed.
     pub engine_failures: Vec<Value>,
-    /// Whether the arm is just what its controller believes, or one draw.
+    /// Whether the arm is just what its controller assumes, or one draw.
     pub truth: Option<String>,
     /// Values that are assumed, with the reason, by their key.
     pub assumed: Value,
@@ -264,7 +268,10 @@ fn run_evidence(path: &Path) -> Result<RunEvidence, Finding> {
     let configurations = configurations(&report);
     Ok(RunEvidence {
         name: report.text("/scenario/name").unwrap_or_default().to_owned(),
-        verdict: report.text("/verdict").unwrap_or("not judged").to_owned(),
+        verdict: report
+            .text("/verdict")
+            .unwrap_or("not evaluated")
+            .to_owned(),
         judged: criteria.len() as u64,
         met,
         missed: missed.collect(),
@@ -314,7 +321,7 @@ fn engines_differ(configurations: &[Value], report: &StoredReport) -> Option<Eng
     })
 }
 
-/// Of each engine the largest differences from the referee at each step.
+/// Of each engine the largest differences from the reference integrator at each step.
 fn step_halving(configurations: &[Value]) -> Vec<StepHalving> {
     let mut found: Vec<StepHalving> = Vec::new();
     for referee in configurations
