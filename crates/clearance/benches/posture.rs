@@ -11,10 +11,10 @@ use std::hint::black_box;
 use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_geometry::{PreparedShape, Shape, separation};
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 use parry3d_f64::math::{Pose as ParryPose, Vector};
 use parry3d_f64::shape::SharedShape;
 

@@ -26,8 +26,5 @@ pub use certificate::{
 };
 pub use known_gaps::KnownGaps;
 pub use model::{ClassMinima, ClearanceModel, ClearanceParts, PairClearance};
-pub use pairs::{
-    PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
-    check_srdf, examine_pairs,
-};
+pub use pairs::{PairConcern, PairExamination, PairSettings, PairState, RangeBound, examine_pairs};
 pub use search::{AIMS, Counted, Counts, Nearby};

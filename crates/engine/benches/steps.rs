@@ -7,7 +7,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use needlebench_cell::{Cell, Overrides, load_scenario};
+use needlebench_cell::Cell;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
     Actuation, Fleet, Hooks, Keep, Motion, MujocoFleet, MujocoPlant, MujocoSettings, Plant,
@@ -15,6 +15,7 @@ use needlebench_engine::{
 };
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
+use needlebench_scenario::{Overrides, load_scenario};
 
 const TIMESTEP_S: f64 = 1e-3;
 const REPETITIONS: usize = 25;

@@ -20,10 +20,10 @@
 
 use std::collections::VecDeque;
 
-use needlebench_cell::imperfections::GearTwist;
-use needlebench_kinematics::random::NormalPairs;
+use needlebench_cell::GearTwist;
 use needlebench_kinematics::trajectory::{JointState, JointTrajectory};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
+use needlebench_numerics::random::NormalPairs;
 
 use crate::{EngineError, Servo};
 
@@ -41,7 +41,7 @@ pub struct Actuation {
     pub gears: GearTwist,
     /// Friction of the joints; none if none.
     pub friction: Option<JointFriction>,
-    /// Torques that the drives can give, N m, where they are less than the servo believes.
+    /// Torques that the drives can give, N m, where they are less than the servo assumes.
     pub drive_limit_nm: Option<Joints>,
     /// Delay from measurement to torque, s; whole steps are used, the next higher number.
     pub torque_delay_s: f64,
@@ -103,7 +103,7 @@ pub struct JointFriction {
     /// Share of the *nominal* friction that the controller adds to its torque, by the sign of the
     /// reference's speed.
     pub compensation: f64,
-    /// Factor from the friction that the controller believes in to the true one, per joint.
+    /// Factor from the friction that the controller assumes to the true one, per joint.
     pub true_over_nominal: Joints,
 }
 
@@ -213,7 +213,7 @@ impl Actuation {
                     return Err(EngineError::BadSetting {
                         key: "friction stiction_nm",
                         value: friction.stiction_nm[joint],
-                        expected: "at least the sliding friction",
+                        expected: "at least the Coulomb friction",
                     });
                 }
                 positive("friction stribeck_rad_s", friction.stribeck_rad_s[joint])?;
@@ -272,7 +272,7 @@ pub(crate) struct Drives<'a> {
     limit_nm: Joints,
     /// Deflection of the bristles, rad.
     bristles_rad: Joints,
-    /// Torques that were asked for and have not yet reached the motors, oldest first.
+    /// Commanded torques that have not yet reached the motors, oldest first.
     on_the_way: VecDeque<Joints>,
     noise: NormalPairs,
     /// The last reference, and the torque that the model says it needs, N m.
@@ -380,8 +380,8 @@ impl<'a> Drives<'a> {
         }
     }
 
-    /// What the controller is told, believes and reads of a state of a recording: states in their order, each
-    /// once, as in the run itself.
+    /// What the controller is told, assumes and reads of a state of a recording: states in their order, each once, as
+    /// in the run itself.
     pub(crate) fn reading(
         &mut self,
         trajectory: &JointTrajectory,

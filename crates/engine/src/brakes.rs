@@ -8,8 +8,8 @@
 //!
 //! # The numbers
 //!
-//! Makers publish distance and time of stops of category 0 at full extension, from a speed and with a
-//! load; an arm's data have them ([`BrakeFigures`]). Under a constant torque the distance would be half
+//! Manufacturers publish distance and time of stops of category 0 at full extension, from a speed and with
+//! a load; an arm's data have them ([`BrakeFigures`]). Under a constant torque the distance would be half
 //! of speed times time; a brake that goes less far is harder while it is fast. Of one joint with the
 //! inertia `M`, from the speed `w`,
 //!
@@ -19,18 +19,16 @@
 //! distance = (M w^2 / c) (x - ln(1 + x)) / x^2
 //! ```
 //!
-//! so `distance / (w time)` gives `x` and the time then `c`. `M` and gravity's torque are those of the
-//! dynamics that is given, stretched out level, with the load at the flange. Where the maker does not say
-//! which way the joint moves, *assumed* is the worse one, downwards, so the constant torque is `c` plus
-//! gravity's half way down. A joint without figures has another one's brake by the ratio of their torque
-//! limits. So both
-//! parameters of a joint's brake are fitted to its two figures: stops that engines make with them show how good the
-//! closed form is, not how good the model is. Of other speeds, loads and postures no maker has published
-//! figures of an arm that ships. A brake that stands holds a multiple of what it has while it slips; the data say which.
+//! so `distance / (w time)` gives `x` and the time then `c`. `M` and gravity's torque are those of the dynamics that is
+//! given, stretched out level, with the load at the flange. Where the manufacturer does not say which way the joint
+//! moves, *assumed* is the worse one, downwards, so the constant torque is `c` plus gravity's half way down. A joint
+//! without figures has another one's brake by the ratio of their torque limits. So both parameters of a joint's brake
+//! are fitted to its two figures: stops that engines make with them show how good the closed form is, not how good the
+//! model is. Of other speeds, loads and postures no manufacturer has published figures of an arm that ships. A brake
+//! that stands holds a multiple of what it has while it slips; the data say which.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
-use needlebench_cell::arm::{BrakeFigure, BrakeFigures};
-use needlebench_cell::scenario::STANDARD_GRAVITY_M_S2;
+use needlebench_cell::{BrakeFigure, BrakeFigures, STANDARD_GRAVITY_M_S2};
 use needlebench_kinematics::{Body, Dynamics, JOINT_COUNT, Joints};
 
 /// Speed below which a joint counts as standing, rad/s: a few millimetres a second at the end of the arm,
@@ -154,7 +152,7 @@ impl Brakes {
     }
 }
 
-/// The arm with the load of the published stops at its flange, level, in standard gravity: makers stop their
+/// The arm with the load of the published stops at its flange, level, in standard gravity: manufacturers stop their
 /// arms on Earth.
 ///
 /// The mass and the inertia of a tool that is part of the last body stay: a needle guide weighs little

@@ -232,7 +232,7 @@ mod tests {
     use super::*;
     use crate::{JointFriction, ServoGains};
     use nalgebra::{Complex, ComplexField as _};
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     const POSTURE: Joints = Joints::new(0.3, -1.2, 1.4, -0.3, 0.7, 0.2);
 

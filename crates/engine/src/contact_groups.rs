@@ -20,7 +20,7 @@ pub(crate) struct ContactBits {
 
 /// Bits per [`Cell::bodies`] entry.
 ///
-/// Bodies with the same partners share a group. Because the relation is symmetric and nobody is his
+/// Bodies with the same partners share a group. Because the relation is symmetric and no body is its
 /// own partner, the groups reproduce it exactly.
 pub(crate) fn contact_bits(cell: &Cell) -> Result<Vec<ContactBits>, EngineError> {
     let mut partners = vec![BTreeSet::new(); cell.bodies.len()];

@@ -36,8 +36,8 @@ pub const KNOWN_DEVIATIONS: [KnownDeviation; 6] = [
                       their slope in the velocity over a whole step, so they are those of half a step later, \
                       which makes both engines of first order in the step. 0.6 um at the tip of a fast motion \
                       at 1 ms; smaller steps help.",
-        law: "the referee with these forces half a step ahead: M a = torque - b(q, v + h a / 2); what else is of \
-              first order in the step is 4 % of the peak",
+        law: "the reference integrator with these forces half a step ahead: M a = torque - b(q, v + \
+             h a / 2); other first-order terms in the step are 4 % of the peak",
         tolerance: 0.06,
     },
     KnownDeviation {
@@ -46,14 +46,15 @@ pub const KNOWN_DEVIATIONS: [KnownDeviation; 6] = [
         description: "MuJoCo's default integrator takes the Coriolis forces of half a step earlier: the tips of a \
                       fast motion differ by 1.2 um from rapier's at 1 ms. needlebench runs MuJoCo with \
                       `implicit`, which leaves 0.09 um.",
-        law: "the referee with these forces half a step behind, beside the referee with them half a step ahead",
+        law: "the reference integrator with these forces half a step behind, compared with them \
+             half a step ahead",
         tolerance: 0.06,
     },
     KnownDeviation {
         key: "rapier_sinks_into_a_contact",
         engine: "rapier",
-        description: "a contact is a spring: a ball of 2 kg rests 0.5 um deep at the default \
-                      stiffness, although its force is exact.",
+        description: "a contact is a spring: a ball of 2 kg rests at 0.5 um penetration at the default \
+             stiffness, although its force is exact.",
         law: "F / (m w^2): m the inertia that the contact meets along its normal, w the contact's natural \
               frequency",
         tolerance: 1e-3,
@@ -72,7 +73,7 @@ pub const KNOWN_DEVIATIONS: [KnownDeviation; 6] = [
         description: "a ball on a lever that sweeps it over a table has 0.52 of Coulomb's friction \
                       while it speeds up: the friction along the lever, where nothing can move, \
                       takes its share of the limit. Friction is off by default.",
-        law: "none: 0.524 is what version 0.36 was seen to have, which says no more than that it has not changed",
+        law: "none: 0.524 was measured with version 0.36; the test only detects changes",
         tolerance: 0.01,
     },
 ];

@@ -2,8 +2,7 @@
 
 use std::fmt;
 
-use needlebench_cell::Cell;
-use needlebench_cell::scenario::EnginesSection;
+use needlebench_cell::{Cell, EngineSettings};
 
 use crate::fleet::{Fleet, Lone};
 use crate::{EngineError, Plant};
@@ -45,7 +44,7 @@ pub trait Engine: fmt::Debug + Sync {
     /// [`EngineError::NotStarted`], with words for people.
     fn start(
         &self,
-        settings: &EnginesSection,
+        settings: &EngineSettings,
         tell: &mut dyn FnMut(&str),
     ) -> Result<Box<dyn EngineSession>, EngineError>;
 }
@@ -93,7 +92,7 @@ pub struct ArmSpec<'a> {
     /// The arm, and all that it may touch.
     pub cell: &'a Cell,
     /// The scenario's settings of the engines.
-    pub settings: &'a EnginesSection,
+    pub settings: &'a EngineSettings,
     /// Coulomb friction between any two solids, in place of the settings'.
     pub friction: f64,
     /// Length of a step, s, in place of the settings'.
@@ -102,12 +101,12 @@ pub struct ArmSpec<'a> {
 
 impl<'a> ArmSpec<'a> {
     /// As the settings have it.
-    pub fn new(cell: &'a Cell, settings: &'a EnginesSection) -> Self {
+    pub fn new(cell: &'a Cell, settings: &'a EngineSettings) -> Self {
         Self {
             cell,
             settings,
             friction: settings.friction,
-            timestep_s: settings.timestep_ms * 1e-3,
+            timestep_s: settings.timestep_s,
         }
     }
 }

@@ -69,13 +69,13 @@ pub enum EngineError {
     #[error("cancelled")]
     Cancelled,
     /// A step length that is no positive number.
-    #[error("the time step is {timestep_s} s; it has to be a positive number")]
+    #[error("the time step is {timestep_s} s; a positive number is required")]
     BadTimestep {
         /// The step, s.
         timestep_s: f64,
     },
     /// A setting outside its range.
-    #[error("{key} is {value}; it has to be {expected}")]
+    #[error("{key} is {value}; required: {expected}")]
     BadSetting {
         /// Name of the setting.
         key: &'static str,
@@ -86,9 +86,9 @@ pub enum EngineError {
     },
     /// A link without mass, or with an inertia that no rigid body has.
     #[error(
-        "{joint} moves a body of {mass_kg} kg whose principal moments of inertia are \
-             {principal_kgm2:?} kg m^2: mass and moments have to be positive, and none of the \
-             moments may exceed the sum of the other two"
+        "{joint} moves a body of {mass_kg} kg with principal moments of inertia {principal_kgm2:?} \
+         kg m^2: mass and moments must be positive, and no moment may exceed the sum of the other \
+         two"
     )]
     BadBody {
         /// Label of the joint that moves the body.
@@ -107,7 +107,7 @@ pub enum EngineError {
         reason: &'static str,
     },
     /// The pairs need more collision groups than the engines have bits.
-    #[error("the cell's collision pairs need {groups} groups; the engines have {limit}")]
+    #[error("the cell's collision pairs require {groups} groups; the engines support {limit}")]
     TooManyContactGroups {
         /// Groups needed.
         groups: usize,

@@ -1,7 +1,6 @@
 //! Many motions in an engine: the one driver of all that is simulated.
 
-use needlebench_cell::Cell;
-use needlebench_cell::scenario::EnginesSection;
+use needlebench_cell::{Cell, EngineSettings};
 
 use crate::simulate::{Hooks, simulate_fleet};
 use crate::{
@@ -23,21 +22,21 @@ pub struct MotionJob<'a> {
 
 /// What all motions of a call have in common.
 #[derive(Debug, Clone, Copy)]
-pub struct MotionSettings<'a> {
+pub struct MotionSettings {
     /// The scenario's settings of the engines.
-    pub engines: &'a EnginesSection,
+    pub engines: EngineSettings,
     /// Length of a step, s.
     pub timestep_s: f64,
     /// An engine whose process dies is started once again, and makes the motions that are missing.
     pub restart: bool,
 }
 
-impl<'a> MotionSettings<'a> {
+impl MotionSettings {
     /// As a scenario has them.
-    pub fn new(engines: &'a EnginesSection) -> Self {
+    pub fn new(engines: &EngineSettings) -> Self {
         Self {
-            engines,
-            timestep_s: engines.timestep_ms * 1e-3,
+            engines: *engines,
+            timestep_s: engines.timestep_s,
             restart: false,
         }
     }
@@ -64,7 +63,7 @@ pub fn run_motions(
     pool: &EnginePool,
     engine: &dyn Engine,
     jobs: &[MotionJob<'_>],
-    settings: MotionSettings<'_>,
+    settings: MotionSettings,
     mut hooks: Hooks<'_>,
     finished: &mut dyn FnMut(usize, Result<Recording, EngineError>),
 ) -> MotionsDone {
@@ -79,7 +78,7 @@ pub fn run_motions(
     let mut restarts = usize::from(settings.restart);
     let mut simulated_s = 0.0;
     while !waiting.is_empty() {
-        let ended = pool.lend(engine, settings.engines, |session| {
+        let ended = pool.lend(engine, &settings.engines, |session| {
             let groups = groups(jobs, &waiting);
             let mut ended = |index: usize, result: Result<Recording, EngineError>| {
                 waiting.retain(|other| *other != index);
@@ -166,14 +165,14 @@ fn drive_group(
     session: &mut dyn EngineSession,
     engine: &dyn Engine,
     group: &Group<'_>,
-    settings: MotionSettings<'_>,
+    settings: MotionSettings,
     identity: &mut Option<EngineIdentity>,
     mut hooks: Hooks<'_>,
     ended: &mut dyn FnMut(usize, Result<Recording, EngineError>),
 ) -> Result<(), EngineError> {
     let arm = ArmSpec {
         cell: group.cell,
-        settings: settings.engines,
+        settings: &settings.engines,
         friction: group.friction.unwrap_or(settings.engines.friction),
         timestep_s: settings.timestep_s,
     };

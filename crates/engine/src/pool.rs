@@ -1,8 +1,8 @@
-//! Engines that are started once and serve whoever comes.
+//! Engines that are started once and serve all callers.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use needlebench_cell::scenario::EnginesSection;
+use needlebench_cell::EngineSettings;
 
 use crate::{Engine, EngineError, EngineSession};
 
@@ -55,7 +55,7 @@ impl EnginePool {
     pub fn start(
         &self,
         engine: &dyn Engine,
-        settings: &EnginesSection,
+        settings: &EngineSettings,
         tell: &mut dyn FnMut(&str),
     ) -> Result<(), EngineError> {
         self.started(engine, settings, tell).map(|_| ())
@@ -79,7 +79,7 @@ impl EnginePool {
     pub fn lend<T>(
         &self,
         engine: &dyn Engine,
-        settings: &EnginesSection,
+        settings: &EngineSettings,
         work: impl FnOnce(&mut dyn EngineSession) -> Result<T, EngineError>,
     ) -> Result<T, EngineError> {
         let mut state = self.started(engine, settings, &mut |_| {})?;
@@ -89,7 +89,7 @@ impl EnginePool {
         work(session.as_mut())
     }
 
-    /// Ends an engine; whoever asks for it next starts it anew.
+    /// Ends an engine; the next request starts it anew.
     ///
     /// # Panics
     /// If the pool has no such engine.
@@ -119,7 +119,7 @@ impl EnginePool {
     fn started(
         &self,
         engine: &dyn Engine,
-        settings: &EnginesSection,
+        settings: &EngineSettings,
         tell: &mut dyn FnMut(&str),
     ) -> Result<MutexGuard<'_, State>, EngineError> {
         let mut state = self.state(engine);

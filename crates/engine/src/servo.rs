@@ -20,9 +20,9 @@ impl Default for ServoGains {
     /// Those of the shipped UR3 and UR3e: 2800 N m/rad and 90 N m s/rad at base, shoulder and elbow, half of
     /// that at the wrists.
     ///
-    /// With 2.0 kg m^2 about the shoulder, which the stretched arm has with its rated load, that is 6 Hz, damped
-    /// at 0.6. At a wrist the armature of 0.07 kg m^2 is nearly the whole inertia, and the explicit servo is
-    /// stable up to steps of 3.2 ms (see [`Servo::stability_ratio`]).
+    /// With 2.0 kg m^2 about the shoulder, which the stretched arm has with its rated load, the natural frequency is
+    /// 6 Hz and the damping ratio 0.6. At a wrist the armature of 0.07 kg m^2 is nearly the whole inertia, and the
+    /// explicit servo is stable up to steps of 3.2 ms (see [`Servo::stability_ratio`]).
     fn default() -> Self {
         Self {
             kp_nm_per_rad: [2800.0, 2800.0, 2800.0, 1400.0, 1400.0, 1400.0],
@@ -43,7 +43,7 @@ pub struct ServoOutput {
 /// Joint servo: inverse dynamics of the reference plus a proportional-derivative term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Servo {
-    /// The robot as the controller believes it to be: the *nominal* model, armature included.
+    /// The robot as the controller assumes it to be: the *nominal* model, armature included.
     pub dynamics: Dynamics,
     /// Gains.
     pub gains: ServoGains,

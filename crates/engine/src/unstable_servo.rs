@@ -19,15 +19,18 @@ impl fmt::Display for UnstableServo {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             formatter,
-            "the servo is unstable: kp, kd, armature and time step make {} swing up by a factor {:.3} \
-             in every step",
+            "the servo is unstable: with kp, kd, armature and time step as given, {} oscillates \
+             with growth factor {:.3} per step",
             self.joint, self.growth
         )?;
         match (self.stable_factor, self.stable_timestep_s) {
-            (None, None) => write!(formatter, "; no gain and no shorter step mends it"),
+            (None, None) => write!(
+                formatter,
+                "; neither lower gains nor a shorter step stabilises it"
+            ),
             (factor, step) => {
                 if let Some(factor) = factor {
-                    write!(formatter, "; stable below {factor:.3} of these gains")?;
+                    write!(formatter, "; stable below {factor:.3} times these gains")?;
                 }
                 if let Some(step_s) = step {
                     write!(

@@ -231,7 +231,7 @@ impl Face {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     use super::*;
     use crate::mesh::SolidMesh;

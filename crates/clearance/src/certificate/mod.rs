@@ -183,8 +183,8 @@ pub struct MotionCertificate {
 }
 
 impl MotionCertificate {
-    /// Certificate of a class; `None` if the cell has no pair of that class, and for the needle
-    /// corridor if the motion has no hold.
+    /// Certificate of a class; `None` if the cell has no pair of that class, and for the access zone if the motion has
+    /// no hold.
     pub fn get(&self, class: ClearanceClass) -> Option<&ClassCertificate> {
         self.classes[class as usize].as_ref()
     }
@@ -233,9 +233,9 @@ impl MotionCertificate {
 
 /// Certifies the clearance of every class over all spans of a motion.
 ///
-/// The needle corridor counts while the arm holds its place: needle and hand come only then. A
-/// motion with joint positions that are not finite gets the lower bound negative infinity.
-/// Deterministic; time and memory are bounded by [`MOST_INTERVALS`].
+/// The access zone counts only during the hold phase, when needle and hand are there. A motion with joint positions
+/// that are not finite gets the lower bound negative infinity. Deterministic; time and memory are bounded by
+/// [`MOST_INTERVALS`].
 pub fn certify(
     model: &ClearanceModel,
     motion: &impl Motion,

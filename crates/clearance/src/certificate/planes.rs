@@ -113,7 +113,7 @@ impl Gaps {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     use super::*;
 

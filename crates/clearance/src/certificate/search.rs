@@ -174,7 +174,7 @@ struct Search<'m, M> {
     couples: Vec<Couple<'m>>,
     postures: Vec<Posture>,
     classes: [Option<ClassCertificate>; CLASS_COUNT],
-    /// Clearances beyond which nobody asks for more, m.
+    /// Clearances beyond this are not resolved, m.
     enough_m: [f64; CLASS_COUNT],
     will_sample: bool,
     closed: Vec<Closed>,

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_geometry::{Shape, SolidMesh};
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
+use needlebench_numerics::random::SplitMix64;
 
 use super::motion::{Motion, RecordedMotion, Span};
 use super::search;
@@ -198,7 +198,7 @@ fn executed_motions_are_certified_with_their_tracking_errors() {
 }
 
 /// A single joint swings the outstretched arm: a way without detours, on which bounds are tight.
-fn swings(resolved: &needlebench_cell::ResolvedScenario, count: usize) -> Vec<JointTrajectory> {
+fn swings(resolved: &needlebench_scenario::ResolvedScenario, count: usize) -> Vec<JointTrajectory> {
     let mut random = SplitMix64::new(17);
     (0..count)
         .map(|k| {

@@ -6,7 +6,6 @@
 //! still measured, because its distance may be the least of its class.
 
 mod range;
-mod srdf;
 
 use std::ops::Range;
 
@@ -14,13 +13,12 @@ use needlebench_cell::{
     BodyPair, Cell, ClearanceClass, LeftOut, PairRule, pair_rule, place_in_chain,
 };
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use serde::Serialize;
 
 use crate::ClearanceModel;
 pub use range::RangeBound;
 use range::{Extreme, PairRange, one_turn};
-pub use srdf::{SrdfAnswer, SrdfVerdict, check_srdf};
 
 /// How pairs are examined.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,13 +4,13 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use crate::common::{Variety, cell};
-use needlebench_cell::{Cell, Overrides, Srdf, load_scenario};
+use needlebench_cell::Cell;
 use needlebench_clearance::{
-    ClearanceModel, PairConcern, PairExamination, PairSettings, PairState, SrdfVerdict, check_srdf,
-    examine_pairs,
+    ClearanceModel, PairConcern, PairExamination, PairSettings, PairState, examine_pairs,
 };
 use needlebench_geometry::{Shape, Solid};
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_scenario::{Overrides, load_scenario};
 
 /// What proofs take off their bounds for rounding, once on either side.
 const ROUNDING_M: f64 = 2e-6;
@@ -227,49 +227,4 @@ fn collision_rates_are_those_known_of_the_arm() {
             "{first} and {second}: {found} against {known}"
         );
     }
-}
-
-#[test]
-fn an_srdf_is_believed_only_where_the_model_agrees() {
-    use SrdfVerdict::{Justified, Refuted, UnknownLink, Unproven};
-    let cell = table3();
-    // As shipped with a widespread UR3 description.
-    let text = r#"<robot name="ur5">
-  <disable_collisions link1="shoulder_link" link2="upper_arm_link"/>
-  <disable_collisions link1="forearm_link" link2="wrist_3_link" reason="Never"/>
-  <disable_collisions link1="wrist_1_link" link2="wrist_3_link" reason="Never"/>
-  <disable_collisions link1="tool0" link2="wrist_3_link" reason="Adjacent"/>
-  <disable_collisions link1="wrist_3_link" link2="gantry" reason="Never"/>
-  <disable_collisions link1="wrist_3_link" link2="ee_link" reason="Never"/>
-</robot>"#;
-    let srdf = Srdf::parse("ur3_gripper.srdf", text).unwrap();
-    let examined = examine_pairs(&cell, &QUICK);
-    let answers = check_srdf(&srdf, &cell, &examined);
-    let verdicts: Vec<_> = answers.iter().map(|answer| answer.verdict).collect();
-    assert_eq!(
-        verdicts,
-        [
-            Justified,
-            Refuted,
-            Justified,
-            Justified,
-            Unproven,
-            UnknownLink
-        ]
-    );
-    let refuted = answers[1].finding.as_ref().unwrap();
-    assert_eq!(refuted.line, Some(3));
-    assert!(refuted.message.contains("'Never'"), "{refuted}");
-    // The posture that it names shows it.
-    let pair = &examined[answers[1].examination.unwrap()];
-    let model = ClearanceModel::new(&cell);
-    let shown = model.all_pairs(&pair.least_at);
-    let deepest = shown
-        .iter()
-        .find(|found| {
-            let bodies = cell.pairs[found.pair];
-            [(bodies.a, bodies.b), (bodies.b, bodies.a)].contains(&(pair.a, pair.b))
-        })
-        .unwrap();
-    assert!(deepest.separation.distance_m < 0.0);
 }

@@ -4,11 +4,11 @@
 use std::f64::consts::PI;
 
 use crate::common::Variety;
-use needlebench_cell::{
-    Arm, BodyKind, BodyPair, Cell, ClearanceClass, Overrides, place_in_chain, resolve_scenario,
-};
+use needlebench_cell::{BodyKind, BodyPair, Cell, ClearanceClass, place_in_chain};
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::Joints;
+use needlebench_robot::Arm;
+use needlebench_scenario::{Overrides, resolve_scenario};
 
 /// The cell of an arm and a tool.
 fn cell(arm: &str) -> Cell {

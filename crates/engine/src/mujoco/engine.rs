@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use needlebench_cell::scenario::EnginesSection;
+use needlebench_cell::EngineSettings;
 
 use super::{
     Environment, HarnessError, HarnessProcess, MujocoFleet, MujocoPlant, MujocoSettings, ensure,
@@ -64,7 +64,7 @@ impl Engine for Mujoco {
     /// Makes the Python environment on first use, and starts the process.
     fn start(
         &self,
-        settings: &EnginesSection,
+        settings: &EngineSettings,
         tell: &mut dyn FnMut(&str),
     ) -> Result<Box<dyn EngineSession>, EngineError> {
         let not_started = |reason: String| EngineError::NotStarted { reason };
@@ -124,7 +124,7 @@ impl MujocoSettings {
 fn in_environment(error: &HarnessError, environment: &Environment) -> String {
     match &environment.folder {
         Some(folder) => format!(
-            "{error}\nhint: its environment is {}; it is made again once that folder is removed",
+            "{error}\nhint: its environment is in {}; remove that folder to recreate it",
             folder.display()
         ),
         None => error.to_string(),

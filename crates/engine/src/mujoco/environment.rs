@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use needlebench_cell::sha256_hex;
+use crate::mujoco::sha256_hex;
 
 pub use install::{DownloadedWheels, WheelPlatform, WheelsFor, download_wheels};
 use python::Python;
@@ -102,19 +102,19 @@ impl EnvironmentOptions {
     }
 }
 
-/// Why there is no Python environment; every message ends with a hint how to mend it.
+/// Why there is no Python environment; every message ends with a hint how to fix it.
 #[derive(Debug, thiserror::Error)]
 pub enum EnvironmentError {
     /// Neither the variable nor a home folder is set.
     #[error(
-        "there is no folder for the MuJoCo environment\n\
-         hint: set NEEDLEBENCH_CACHE_DIR to a folder that can be written"
+        "no folder for the MuJoCo environment\n\
+         hint: set NEEDLEBENCH_CACHE_DIR to a writable folder"
     )]
     NoCacheFolder,
     /// The cache folder cannot be written.
     #[error(
         "cannot write {}: {source}\n\
-         hint: set NEEDLEBENCH_CACHE_DIR to a folder that can be written and has 100 MB free",
+         hint: set NEEDLEBENCH_CACHE_DIR to a writable folder with 100 MB free",
         path.display()
     )]
     Unwritable {
@@ -125,7 +125,7 @@ pub enum EnvironmentError {
     },
     /// No suitable Python on the search path.
     #[error(
-        "MuJoCo needs Python 3.11 or newer, 64 bit, and there is none on PATH; {tried}\n\
+        "MuJoCo requires 64-bit Python 3.11 or newer, and none is on PATH; {tried}\n\
          hint: install one, or set NEEDLEBENCH_PYTHON to its path"
     )]
     NoPython {
@@ -160,12 +160,12 @@ pub enum EnvironmentError {
         what: String,
         /// What went wrong.
         reason: String,
-        /// How to mend it.
+        /// How to fix it.
         hint: String,
     },
     /// Another process has been making the same environment for too long.
     #[error(
-        "another needlebench has been setting MuJoCo up in {} for more than {seconds} s\n\
+        "another needlebench has been setting up MuJoCo in {} for more than {seconds} s\n\
          hint: end it, or set NEEDLEBENCH_CACHE_DIR to another folder",
         path.display()
     )]
@@ -263,14 +263,14 @@ pub fn ensure_with(
     };
     let folder = target.display();
     if seal::look(&target, &key) == Found::Complete {
-        tracing::debug!(%folder, python = %python.version, "MuJoCo's environment is there");
+        tracing::debug!(%folder, python = %python.version, "MuJoCo environment found");
         return Ok(environment);
     }
-    tracing::info!(%folder, python = %python.version, "MuJoCo's environment is missing or damaged");
+    tracing::info!(%folder, python = %python.version, "MuJoCo environment missing or damaged");
     let failed = |source| unwritable(&cache, source);
     fs::create_dir_all(&cache).map_err(failed)?;
     let guard = Guard::acquire(&cache, GUARD_LIMIT, || {
-        progress("waiting for another needlebench that is setting MuJoCo up");
+        progress("waiting for another needlebench that is setting up MuJoCo");
     });
     let Some(_guard) = guard.map_err(failed)? else {
         return Err(EnvironmentError::Busy {
@@ -281,12 +281,12 @@ pub fn ensure_with(
     match seal::look(&target, &key) {
         Found::Complete => return Ok(environment),
         Found::Damaged(reason) => progress(&format!(
-            "the MuJoCo environment in {folder} is damaged and is made again: {reason}"
+            "the MuJoCo environment in {folder} is damaged and will be recreated: {reason}"
         )),
         Found::Nothing => {}
     }
     progress(&format!(
-        "setting MuJoCo {MUJOCO_VERSION} up for Python {} in {folder} (once)",
+        "setting up MuJoCo {MUJOCO_VERSION} for Python {} in {folder} (once)",
         python.version
     ));
     let staging = Staging::beside(&target).map_err(failed)?;

@@ -10,6 +10,10 @@ mod process;
 mod settings;
 mod tail;
 
+use std::fmt::Write as _;
+
+use sha2::{Digest, Sha256};
+
 pub(crate) use engine::Mujoco;
 pub use environment::{
     DownloadedWheels, Environment, EnvironmentError, EnvironmentOptions, Prepared, PythonVersion,
@@ -23,3 +27,12 @@ pub use process::{
     InverseDynamics, PlantHandle, Replay,
 };
 pub use settings::{MujocoIntegrator, MujocoSettings};
+
+/// SHA-256 of some bytes, as people write it.
+pub(crate) fn sha256_hex(bytes: &[u8]) -> String {
+    let hash = Sha256::digest(bytes);
+    hash.iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").expect("a text takes everything");
+        text
+    })
+}

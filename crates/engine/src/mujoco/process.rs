@@ -85,7 +85,7 @@ pub enum HarnessError {
         message: String,
     },
     /// A vector of the wrong length was to be sent.
-    #[error("{what} has {got} values, the model needs {expected}")]
+    #[error("{what} has {got} values, the model requires {expected}")]
     Length {
         /// Which vector.
         what: &'static str,
@@ -129,7 +129,7 @@ fn quoted(stderr_tail: &str) -> String {
     if stderr_tail.is_empty() {
         String::new()
     } else {
-        format!("; its last words:\n{stderr_tail}")
+        format!("; last output:\n{stderr_tail}")
     }
 }
 

@@ -1,6 +1,6 @@
 //! rapier as one of the engines.
 
-use needlebench_cell::scenario::EnginesSection;
+use needlebench_cell::EngineSettings;
 
 use super::{RapierPlant, RapierSettings};
 use crate::{ArmSpec, Engine, EngineError, EngineSession, Plant};
@@ -24,7 +24,7 @@ impl Engine for Rapier {
 
     fn start(
         &self,
-        _settings: &EnginesSection,
+        _settings: &EngineSettings,
         _tell: &mut dyn FnMut(&str),
     ) -> Result<Box<dyn EngineSession>, EngineError> {
         Ok(Box::new(InProcess))

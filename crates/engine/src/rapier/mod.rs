@@ -15,7 +15,7 @@ use crate::{Contact, EngineError, EngineIdentity, Plant, PlantState};
 pub(crate) use engine::Rapier;
 use world::{Blueprint, World};
 
-/// Version of the `rapier3d-f64` crate that is linked; held against `Cargo.lock` by a test.
+/// Version of the `rapier3d-f64` crate that is linked; compared with `Cargo.lock` by a test.
 const RAPIER_VERSION: &str = "0.36.1";
 
 /// Settings of rapier's solver, beside the step length.

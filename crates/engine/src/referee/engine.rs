@@ -1,11 +1,11 @@
-//! The referee, driven as the engines are.
+//! The reference integrator, driven as the engines are.
 
-use needlebench_cell::scenario::EnginesSection;
+use needlebench_cell::EngineSettings;
 
 use super::{RefereePlant, RefereeSettings};
 use crate::{ArmSpec, Engine, EngineError, EngineSession, Plant};
 
-/// The referee. It judges engines and is none of [`ENGINES`](crate::ENGINES), since it knows no
+/// The reference integrator. It verifies engines and is none of [`ENGINES`](crate::ENGINES), since it knows no
 /// contacts.
 pub const REFEREE: &dyn Engine = &Referee;
 
@@ -23,7 +23,7 @@ impl Engine for Referee {
 
     fn start(
         &self,
-        _settings: &EnginesSection,
+        _settings: &EngineSettings,
         _tell: &mut dyn FnMut(&str),
     ) -> Result<Box<dyn EngineSession>, EngineError> {
         Ok(Box::new(InProcess))

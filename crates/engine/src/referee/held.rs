@@ -1,4 +1,4 @@
-//! The referee over short stretches of an engine's motion, under the torques that the engine's run
+//! The reference integrator over short stretches of an engine's motion, under the torques that the engine's run
 //! recorded and nothing else.
 
 use nalgebra::{Matrix6, SymmetricEigen};
@@ -14,35 +14,35 @@ const STEPS_BACK: usize = 3;
 /// Step of the central differences of the gravity torque, rad: truncation and rounding leave 1e-8 of it.
 const DIFFERENCE_RAD: f64 = 1e-5;
 
-/// Where the referee arrives at the end of a window of a recording.
+/// Where the reference integrator arrives at the end of a window of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldWindow {
     /// State of the recording that the window starts from.
     pub first: usize,
     /// State of the recording that it ends at.
     pub last: usize,
-    /// The referee at its end.
+    /// The reference integrator at its end.
     pub state: PlantState,
     /// How many times as large gravity makes a difference of position over the window, at most.
     pub growth: f64,
 }
 
 impl RefereePlant {
-    /// The referee over the windows of `window_steps` steps that the first `steps` steps of a recording
+    /// The reference integrator over the windows of `window_steps` steps that the first `steps` steps of a recording
     /// fall into, the last one moved back so that it ends with them; none if they are fewer.
     ///
-    /// Each window starts from the engine's own state and goes under the engine's recorded torques,
-    /// held as the engine applies them. Nothing pulls the referee back to the recording: neither gains nor
-    /// reference are known here. So what it ends away from the recording by is the engine's dynamics
-    /// and integration over the window, whatever servo made the torques. Windows have to be
-    /// short because nothing holds a raised arm: [`HeldWindow::growth`] says how much that matters.
+    /// Each window starts from the engine's own state and goes under the engine's recorded torques, held as the engine
+    /// applies them. Nothing pulls the reference integrator back to the recording: neither gains nor reference are
+    /// known here. So what it ends away from the recording by is the engine's dynamics and integration over the window,
+    /// whatever servo made the torques. Windows have to be short because nothing holds a raised arm:
+    /// [`HeldWindow::growth`] says how much that matters.
     ///
     /// An engine whose velocities belong to `a` before the time of their states computes them from
     /// torques that act from `a` before their sample: `a` is half a step in the engines (see
     /// [`TorqueHold`](super::TorqueHold)) and 0 for a drive that holds a torque from its sample on.
     ///
     /// # Errors
-    /// [`EngineError::Unstable`] where the referee cannot follow the torques.
+    /// [`EngineError::Unstable`] where the reference integrator cannot follow the torques.
     pub fn held_windows(
         &self,
         recording: &Recording,

@@ -1,4 +1,4 @@
-//! The arm by our own equations of motion, integrated to rounding: the referee of the engines.
+//! The arm by our own equations of motion, integrated to rounding: the reference integrator of the engines.
 
 mod engine;
 mod held;
@@ -46,7 +46,7 @@ impl TorqueHold {
     }
 }
 
-/// Settings of the referee, beside the step length.
+/// Settings of the reference integrator, beside the step length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RefereeSettings {

@@ -3,8 +3,7 @@
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use needlebench_cell::scenario::EnginesSection;
-use needlebench_cell::{BodyKind, Cell, CollisionBody, Frame};
+use needlebench_cell::{BodyKind, Cell, CollisionBody, EngineSettings, Frame};
 use needlebench_engine::{
     Actuation, ArmSpec, ENGINES, Engine, EngineError, EngineIdentity, EnginePool, EngineSession,
     Hooks, Keep, Motion, MotionJob, MotionSettings, MotionsDone, Plant, PlantState, Recording,
@@ -12,6 +11,7 @@ use needlebench_engine::{
 };
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
+use needlebench_scenario::scenario::EnginesSection;
 
 use crate::common;
 use crate::replay::Replay;
@@ -102,7 +102,7 @@ fn run(
     restart: bool,
     hooks: Hooks<'_>,
 ) -> (MotionsDone, Ends) {
-    let engines = EnginesSection::default();
+    let engines = EnginesSection::default().settings();
     let settings = MotionSettings {
         restart,
         ..MotionSettings::new(&engines)
@@ -125,7 +125,7 @@ fn engine(name: &str) -> &'static dyn Engine {
 #[test]
 fn motions_are_those_of_single_plants_bit_for_bit_in_every_engine() {
     let all = Jobs::new(10);
-    let (jobs, engines) = (all.all(), EnginesSection::default());
+    let (jobs, engines) = (all.all(), EnginesSection::default().settings());
     let pool = EnginePool::new(ENGINES);
     for &engine in ENGINES {
         let (done, ends) = run(&pool, engine, &jobs, false, Hooks::default());
@@ -274,7 +274,7 @@ impl Engine for Frail {
 
     fn start(
         &self,
-        settings: &EnginesSection,
+        settings: &EngineSettings,
         tell: &mut dyn FnMut(&str),
     ) -> Result<Box<dyn EngineSession>, EngineError> {
         if STARTS.fetch_add(1, Ordering::Relaxed) == 0 {

@@ -261,7 +261,7 @@ fn gravity_enlarges_no_difference_by_more_than_the_growth() {
     let undisturbed = window(&recording);
     let root = dynamics.mass_matrix(&START).cholesky().unwrap().l();
     let mut most = 0.0_f64;
-    let mut random = needlebench_kinematics::random::SplitMix64::new(2);
+    let mut random = needlebench_numerics::random::SplitMix64::new(2);
     for _ in 0..40 {
         let difference = Joints::from_fn(|_, _| 1e-6 * random.uniform(-1.0, 1.0));
         recording.state[0].position = START + difference;

@@ -1,8 +1,7 @@
 //! Emergency stops of category 0 in both engines, against the published ones that their brakes are fitted to.
 
 use crate::process as harness;
-use needlebench_cell::Cell;
-use needlebench_cell::arm::{BrakeFigure, BrakeFigures};
+use needlebench_cell::{BrakeFigure, BrakeFigures, Cell};
 use needlebench_engine::{
     Actuation, Brakes, Braking, Hooks, Keep, Motion, MujocoPlant, MujocoSettings, Plant,
     RapierPlant, RapierSettings, Recording, Servo, ServoGains, loaded, simulate_motion, stretched,

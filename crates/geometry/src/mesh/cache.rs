@@ -139,7 +139,7 @@ impl fmt::Display for OtherWriters {
             Self::Owner { owner, user } => {
                 write!(f, "belongs to user {owner}, and this is user {user}")
             }
-            Self::Mode(mode) => write!(f, "can be written to by others (mode {mode:03o})"),
+            Self::Mode(mode) => write!(f, "is writable by others (mode {mode:03o})"),
         }
     }
 }

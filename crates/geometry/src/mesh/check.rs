@@ -18,7 +18,7 @@ const BESIDE: f64 = 1e-7;
 pub enum MeshDefect {
     /// A triangle without an area.
     #[error(
-        "triangle {triangle} at {} has no area{}",
+        "triangle {triangle} at {} has zero area{}",
         place(at_m),
         and_others(*count, "such triangle", "such triangles")
     )]
@@ -78,7 +78,7 @@ pub enum MeshDefect {
 }
 
 impl MeshDefect {
-    /// How to mend it.
+    /// How to fix it.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::NoArea { .. } => {
@@ -93,7 +93,7 @@ impl MeshDefect {
                  the segmentation with its ends capped"
             }
             Self::Inverted { .. } => {
-                "turn the triangles round (MeshLab: Invert Faces Orientation), so that their \
+                "invert the triangles (MeshLab: Invert Faces Orientation), so that their \
                  corners run counter-clockwise seen from outside"
             }
             Self::NoVolume => "a solid needs a volume: is this a single sheet?",
@@ -114,7 +114,7 @@ fn and_others(count: usize, one: &str, many: &str) -> String {
     }
 }
 
-/// What is worth knowing of a closed mesh.
+/// Properties of a closed mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshFacts {
     /// Closed parts that share no vertex.

@@ -1,4 +1,4 @@
-//! How well convex pieces stand for a solid.
+//! Fidelity of convex pieces to a solid.
 
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 /// Samples over all pieces, and over the surface, about.
 const SAMPLES: f64 = 20_000.0;
 
-/// How far convex pieces are from the solid that they stand for; measured on samples.
+/// How far convex pieces are from their solid; measured on samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fidelity {
     /// Convex pieces.
@@ -71,8 +71,8 @@ impl Fidelity {
     /// For notes.
     pub fn in_words(&self) -> String {
         format!(
-            "the engines collide with {} convex pieces of it, which reach up to {:.2} mm beyond \
-             its surface (mean {:.2} mm) and leave up to {:.4} mm of it uncovered (samples every \
+            "in the engines it consists of {} convex pieces, which reach up to {:.2} mm beyond its \
+             surface (mean {:.2} mm) and leave up to {:.4} mm of it uncovered (samples every \
              {:.1} mm)",
             self.pieces,
             self.overhang_m * 1e3,

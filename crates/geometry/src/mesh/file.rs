@@ -16,7 +16,7 @@ pub enum MeshFileError {
     #[error("it is empty or cut off")]
     CutOff,
     /// What Git LFS leaves where it has not fetched a file.
-    #[error("it is a pointer of Git LFS, not the file itself: `git lfs pull` fetches it")]
+    #[error("it is a Git LFS pointer, not the file itself: fetch it with `git lfs pull`")]
     LfsPointer,
     /// Not of its format, or of a part of it that is not read.
     #[error("{0}")]

@@ -22,14 +22,14 @@ const FLAT: f64 = 1e-6;
 /// Why points have no convex hull.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum HullError {
-    /// There is nothing to enclose.
+    /// No points.
     #[error("it has no points")]
     NoPoints,
     /// No volume.
     #[error("its points lie in a plane: a hull needs a volume")]
     Flat,
     /// Coordinates so small or so large that products of three of them are not numbers.
-    #[error("rounding broke its convex hull")]
+    #[error("its convex hull is numerically degenerate")]
     Broken,
 }
 

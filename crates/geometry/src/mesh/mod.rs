@@ -1,4 +1,4 @@
-//! Triangle meshes: reading, checking and mending them, and the convex pieces that engines need.
+//! Triangle meshes: reading, checking and repairing them, and the convex pieces that engines need.
 
 mod cache;
 mod check;

@@ -9,12 +9,12 @@ use super::surface_index::SurfaceIndex;
 use crate::encoding::{decode, encode};
 use crate::triangle_mesh::ConvexMesh;
 
-/// Convex pieces that together stand for a solid.
+/// Convex pieces that together approximate a solid.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ConvexPieces {
     /// The pieces; none if neither the solid nor a part of it has a hull with a volume.
     pub hulls: Vec<ConvexMesh>,
-    /// How well they stand for it.
+    /// Their fidelity.
     pub fidelity: Fidelity,
 }
 
@@ -26,7 +26,7 @@ const PIECES: Kind<ConvexPieces> = Kind {
     decode: |bytes, _| decode(bytes),
 };
 
-/// Pieces of a solid and how well they stand for it.
+/// Pieces of a solid and their fidelity.
 pub(super) fn pieces_of(solid: &SurfaceIndex) -> ConvexPieces {
     kept(&PIECES, solid.mesh(), || {
         let hulls = decompose(solid);

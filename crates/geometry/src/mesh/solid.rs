@@ -73,7 +73,7 @@ impl SolidMesh {
         self.index.tree()
     }
 
-    /// Convex pieces that together stand for the solid in the engines. Seconds for a finely drawn surface,
+    /// Convex pieces that together approximate the solid in the engines. Seconds for a finely drawn surface,
     /// unless the user's cache folder has them.
     pub fn pieces(&self) -> &ConvexPieces {
         self.pieces.get_or_init(|| pieces_of(&self.index))

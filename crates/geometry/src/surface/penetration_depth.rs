@@ -1,7 +1,7 @@
 //! Depth of a convex core or a surface that is partly or wholly inside a solid.
 //!
 //! The depth of a penetration is the length of the shortest motion without turning that ends it.
-//! Beyond convex shapes nobody finds that in reasonable time. Reported is the shortest of a set
+//! Beyond convex shapes that cannot be found in reasonable time. Reported is the shortest of a set
 //! of straight ways out, each proven: an upper bound, so that the signed distance is never
 //! optimistic. Tried are the shortest way out of the convex hull, the way to the nearest point
 //! of the surface, and the ways across the pieces of surface that are touched; the best is then

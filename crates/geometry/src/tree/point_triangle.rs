@@ -41,7 +41,7 @@ pub(super) fn nearest_on_triangle(
 
 #[cfg(test)]
 mod tests {
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     use super::*;
 

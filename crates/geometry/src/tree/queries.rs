@@ -202,7 +202,7 @@ impl TriangleTree {
 mod tests {
     use std::f64::consts::TAU;
 
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     use super::*;
     use crate::sample_solids::{both, bowl, cuboid, inverted, random_points, torus};

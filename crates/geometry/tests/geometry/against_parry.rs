@@ -20,7 +20,7 @@ use needlebench_geometry::mesh::{
 };
 use needlebench_geometry::sample_solids::{both, bowl, cuboid, ell, inverted, torus};
 use needlebench_geometry::{ConvexMesh, TriangleMesh};
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use parry3d_f64::math::Vector;
 use parry3d_f64::shape::{TriMesh, TriMeshConnectedComponents, TriMeshFlags};
 use parry3d_f64::transformation::try_convex_hull;

@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use needlebench_cell::{
-    BodyKind, Cell, CollisionBody, Frame, Link, ModelSource, Needle, NeedleCorridor, Robot, Tool,
+    BodyKind, Cell, CollisionBody, Frame, Link, Needle, NeedleCorridor, Robot, Tool,
 };
 use needlebench_geometry::sample_solids::ellipsoid;
 use needlebench_geometry::{ConvexMesh, Shape, Solid, TriangleMesh};
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{
     Body, Chain, ChainJoint, JOINT_COUNT, JointLimit, JointLimits, Joints, Pose,
 };
+use needlebench_numerics::random::SplitMix64;
 
 /// Numbers that look random and are the same every time.
 pub struct Variety(SplitMix64);
@@ -98,13 +98,6 @@ fn cuboid(name: &str, centre: [f64; 3], half: [f64; 3]) -> Solid {
         shape,
         Pose::translation(centre[0], centre[1], centre[2]),
     )
-}
-
-fn source() -> ModelSource {
-    ModelSource {
-        file: "by hand".into(),
-        sha256: String::new(),
-    }
 }
 
 fn link(name: &str, solids: Vec<Solid>) -> Link {
@@ -200,7 +193,6 @@ fn robot() -> Robot {
             ],
         ),
         links,
-        members: Vec::new(),
         unseen: Vec::new(),
         bodies: [Body::massless(); JOINT_COUNT],
         limits: JointLimits(
@@ -211,11 +203,6 @@ fn robot() -> Robot {
                 effort_nm: 50.0,
             }; JOINT_COUNT],
         ),
-        arm: None,
-        source: source(),
-        calibration: None,
-        meshes: Vec::new(),
-        notes: Vec::new(),
     }
 }
 
@@ -250,7 +237,6 @@ fn tool() -> Tool {
             outer_diameter_m: 0.00127,
             length_m: 0.15,
         },
-        source: source(),
     }
 }
 

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use nalgebra::UnitVector3;
-use needlebench_cell::{Overrides, ResolvedScenario, Roll, load_scenario};
 use needlebench_kinematics::ik::Kinematics;
 use needlebench_kinematics::trajectory::{JointPath, JointTrajectory, Phase};
+use needlebench_scenario::{Overrides, ResolvedScenario, Roll, load_scenario};
 
 /// A shipped scenario.
 pub fn shipped(name: &str) -> ResolvedScenario {

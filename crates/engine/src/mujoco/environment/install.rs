@@ -9,7 +9,7 @@ use std::process::Command;
 use std::str::FromStr;
 use std::time::Duration;
 
-use needlebench_cell::sha256_hex;
+use crate::mujoco::sha256_hex;
 
 use super::command::run;
 use super::python::{Python, PythonVersion, find, made_for, on_path};
@@ -74,7 +74,7 @@ pub(super) fn install(
             Err(failure) => progress(&format!("uv failed, trying pip instead: {failure}")),
         }
     }
-    progress("making a Python environment");
+    progress("creating a Python environment");
     make_venv(python, folder)?;
     progress(&match wheels {
         Some(wheels) => format!("installing MuJoCo and numpy from {}", wheels.display()),
@@ -98,8 +98,8 @@ pub(super) fn install(
                 // pip names a damaged file last, after every hash that it could have had.
                 reason: unsuitable(wheels, lock).unwrap_or(reason),
                 hint: format!(
-                    "{download}\ngives the wheels for this machine, on one with a network; copy the whole folder \
-                     here"
+                    "{download}\ndownloads the wheels for this machine on one with a network; copy \
+                     the whole folder here"
                 ),
             },
             None => EnvironmentError::Failed {
@@ -205,7 +205,7 @@ fn unsuitable(folder: &Path, lock: &str) -> Option<String> {
         .collect();
     wheels.sort();
     if wheels.is_empty() {
-        return Some("it holds no wheels (*.whl)".to_owned());
+        return Some("it contains no wheels (*.whl)".to_owned());
     }
     let pinned = lock.lines().filter_map(|line| line.split_once("=="));
     let prefixes: Vec<String> = pinned
@@ -218,7 +218,7 @@ fn unsuitable(folder: &Path, lock: &str) -> Option<String> {
         let name = file.file_name()?.to_str()?;
         let pinned = prefixes.iter().any(|prefix| name.starts_with(prefix));
         let damaged = pinned && !lock.contains(&sha256_hex(&fs::read(&file).ok()?));
-        damaged.then(|| format!("{name} is damaged: its SHA-256 is none of those that are known"))
+        damaged.then(|| format!("{name} is damaged: its SHA-256 does not match any expected one"))
     })
 }
 
@@ -390,8 +390,8 @@ mod tests {
         for (text, reason) in [
             ("3.10", "3.11 to 3.15"),
             ("3.16", "3.11 to 3.15"),
-            ("three", "no version such as 3.12"),
-            ("", "no version such as 3.12"),
+            ("three", "not a version such as 3.12"),
+            ("", "not a version such as 3.12"),
         ] {
             let refused = text.parse::<PythonVersion>().unwrap_err();
             assert!(refused.contains(reason), "{text}: {refused}");

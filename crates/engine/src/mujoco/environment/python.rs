@@ -31,7 +31,7 @@ impl FromStr for PythonVersion {
     /// Reads `3.12` or `3.12.1`; of those that the wheels exist for.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let version =
-            leading(text).ok_or_else(|| format!("`{text}` is no version such as 3.12"))?;
+            leading(text).ok_or_else(|| format!("`{text}` is not a version such as 3.12"))?;
         if !(OLDEST..=NEWEST).contains(&version) {
             return Err(made_for());
         }
@@ -50,7 +50,7 @@ fn leading(version: &str) -> Option<PythonVersion> {
 
 /// The Pythons that there are wheels for, in words.
 pub(super) fn made_for() -> String {
-    format!("MuJoCo {MUJOCO_VERSION} is made for Python {OLDEST} to {NEWEST}")
+    format!("MuJoCo {MUJOCO_VERSION} supports Python {OLDEST} to {NEWEST}")
 }
 
 /// In the order in which they are tried.
@@ -95,7 +95,7 @@ pub(super) fn find(options: &EnvironmentOptions) -> Result<Python, EnvironmentEr
         }
     }
     let tried = if rejected.is_empty() {
-        "found none at all".to_owned()
+        "none found".to_owned()
     } else {
         format!("tried:{}", rejected.concat())
     };
@@ -138,7 +138,7 @@ fn judge(answer: &str) -> Result<Python, String> {
         return Err(format!("{name}: not the standard CPython"));
     }
     if bits != "64" {
-        return Err(format!("{name}: MuJoCo needs 64 bit"));
+        return Err(format!("{name}: MuJoCo requires 64 bit"));
     }
     if wheels < OLDEST {
         return Err(format!("Python {version} is too old: {}", made_for()));

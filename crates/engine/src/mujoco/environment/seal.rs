@@ -2,11 +2,11 @@
 //!
 //! Once everything is in place it is sealed: size, times and SHA-256 of each file are written down, under a hash of
 //! all that. Later starts only look at sizes and times. A file that anybody writes to, cuts off or replaces has other
-//! ones, and is hashed again. A file that was not installed is one that nobody has looked at: Python runs what it finds,
+//! ones, and is hashed again. A file that was not installed was never checked: Python runs what it finds,
 //! a `.pth` at every start. Bytecode is sealed with the rest, once what is used has been imported, and Python is started
 //! such that it writes none; other bytecode is removed.
 //!
-//! A seal is worth no more than the folder that it lies in: whoever may write there may seal what they like. Folders that
+//! A seal is only as good as its folder: a user who may write there may seal anything. Folders that
 //! others may write to are therefore not what was installed.
 
 use std::collections::BTreeSet;
@@ -16,7 +16,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use needlebench_cell::sha256_hex;
+use crate::mujoco::sha256_hex;
 use needlebench_geometry::mesh::other_writers;
 
 use super::install::venv_python;
@@ -72,7 +72,7 @@ fn check(folder: &Path, key: &str, lines: &str) -> Result<(), String> {
     // A link to an interpreter that has gone is none.
     let interpreter = fs::metadata(&python).map_err(|error| missing(&python, error))?;
     if !interpreter.is_file() {
-        return Err(format!("{} is no file", python.display()));
+        return Err(format!("{} is not a file", python.display()));
     }
     let mut renewed = String::new();
     for line in lines.lines() {
@@ -124,7 +124,7 @@ fn is_bytecode(path: &Path) -> bool {
 }
 
 /// A file that is not among those that were sealed, or a link among the packages, where none is installed. Bytecode that
-/// a Python wrote which somebody started by hand is removed and not missed.
+/// a Python wrote that was started by hand is removed and not needed.
 fn added(folder: &Path, known: &BTreeSet<&str>) -> io::Result<Option<PathBuf>> {
     let is_added = |(path, metadata): &(PathBuf, Metadata)| {
         let name = path.strip_prefix(folder).unwrap_or(path).to_string_lossy();
@@ -175,7 +175,7 @@ fn entries(folder: &Path) -> io::Result<Vec<(PathBuf, Metadata)>> {
     Ok(found)
 }
 
-/// Size and times of a file: whoever writes to it changes one of them.
+/// Size and times of a file: every write changes one of them.
 fn state(metadata: &Metadata) -> String {
     let modified = metadata.modified().ok();
     let modified = modified.and_then(|time| time.duration_since(UNIX_EPOCH).ok());
@@ -183,7 +183,7 @@ fn state(metadata: &Metadata) -> String {
     format!("{}:{modified}:{}", metadata.len(), changed(metadata))
 }
 
-/// When the file's entry was changed last, which nobody can set back.
+/// When the file's entry was changed last, which cannot be set back.
 #[cfg(unix)]
 fn changed(metadata: &Metadata) -> String {
     use std::os::unix::fs::MetadataExt;

@@ -1,4 +1,4 @@
-//! An environment is there whole or not at all, whoever else makes one, and whenever that ends.
+//! An environment is there whole or not at all, however many processes make one, and whenever they end.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -16,7 +16,7 @@ pub(super) struct Guard {
 }
 
 impl Guard {
-    /// Waits for the guard of a folder of environments; `None` when somebody else holds it for longer than `limit`.
+    /// Waits for the guard of a folder of environments; `None` when another process holds it for longer than `limit`.
     ///
     /// Set-ups that died half-way are gone then: who makes one holds the guard.
     pub(super) fn acquire(

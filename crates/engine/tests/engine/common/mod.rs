@@ -8,15 +8,14 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Matrix3, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use needlebench_cell::arm::BrakeFigures;
 use needlebench_cell::{
-    Cell, CollisionBody, Link, ModelSource, Needle, NeedleCorridor, Overrides, Robot, Tool,
-    load_robot,
+    BrakeFigures, Cell, CollisionBody, Link, Needle, NeedleCorridor, Robot, Tool,
 };
 use needlebench_geometry::{Shape, Solid};
 use needlebench_kinematics::{
     Body, Chain, ChainJoint, JOINT_COUNT, JOINT_LABELS, JointLimit, JointLimits, Joints, Pose,
 };
+use needlebench_scenario::{Overrides, load_robot};
 
 /// Pose from a URDF origin: position (m) and roll, pitch, yaw (rad).
 pub fn origin(xyz: [f64; 3], rpy: [f64; 3]) -> Pose {
@@ -198,14 +197,6 @@ fn tool() -> Tool {
             outer_diameter_m: 1.47e-3,
             length_m: 0.15,
         },
-        source: source(),
-    }
-}
-
-fn source() -> ModelSource {
-    ModelSource {
-        file: "test".into(),
-        sha256: String::new(),
     }
 }
 
@@ -233,7 +224,7 @@ pub fn brake_figures(arm: &str) -> BrakeFigures {
         ..Overrides::default()
     };
     let robot = load_robot(&overrides).expect("shipped arms are sound");
-    let used = robot.arm.expect("it is the arm's own URDF");
+    let used = robot.description.arm.expect("it is the arm's own URDF");
     used.brakes().expect("it has figures of its brakes")
 }
 
@@ -252,15 +243,9 @@ pub fn ur3(surroundings: Vec<CollisionBody>) -> Cell {
         chain: chain(),
         base: link("base", vec![base_solid]),
         links: JOINT_LABELS.map(|name| link(name, solids.next().expect("six links"))),
-        members: Vec::new(),
         unseen: Vec::new(),
         bodies: link_bodies(),
         limits: limits(),
-        arm: None,
-        source: source(),
-        calibration: None,
-        meshes: Vec::new(),
-        notes: Vec::new(),
     };
     Cell::assemble(
         robot,

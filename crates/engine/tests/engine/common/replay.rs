@@ -2,8 +2,7 @@
 //!
 //! All that a further engine has to be.
 
-use needlebench_cell::Cell;
-use needlebench_cell::scenario::EnginesSection;
+use needlebench_cell::{Cell, EngineSettings};
 use needlebench_engine::{
     ArmSpec, Contact, Engine, EngineError, EngineIdentity, EngineSession, Plant, PlantState,
 };
@@ -25,7 +24,7 @@ impl Engine for Replay {
 
     fn start(
         &self,
-        _settings: &EnginesSection,
+        _settings: &EngineSettings,
         _tell: &mut dyn FnMut(&str),
     ) -> Result<Box<dyn EngineSession>, EngineError> {
         Ok(Box::new(Session))

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use needlebench_geometry::sample_solids::ellipsoid;
 use needlebench_geometry::{ConvexMesh, Shape};
 use needlebench_kinematics::Pose;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 
 /// Numbers that look random and are the same every time.
 pub struct Variety(SplitMix64);
