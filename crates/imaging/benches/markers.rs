@@ -12,7 +12,7 @@ use needlebench_imaging::registration::{
     MatchOptions, ReferenceFrame, ReferenceMarker, match_markers, register_weighted,
 };
 use needlebench_imaging::{Volume, VoxelGrid};
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 
 const SIZE: [usize; 3] = [512, 512, 300];
 

@@ -1,8 +1,8 @@
-//! What is wrong with a volume, and what is worth knowing of one.
+//! Errors of a volume, and remarks on one.
 
 use serde::{Deserialize, Serialize};
 
-/// Why there is no answer: what is wrong, where, and how to mend it.
+/// An error: what is wrong, where, and how to fix it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ImagingError {
     /// The user stopped it.
@@ -15,7 +15,7 @@ pub enum ImagingError {
         place: Option<String>,
         /// What is wrong, with value and unit.
         message: String,
-        /// How to mend it.
+        /// How to fix it.
         hint: Option<String>,
     },
 }
@@ -43,7 +43,7 @@ impl ImagingError {
         }
     }
 
-    /// With how to mend it.
+    /// With how to fix it.
     #[must_use]
     pub fn hint(self, hint: impl Into<String>) -> Self {
         match self {
@@ -57,12 +57,12 @@ impl ImagingError {
     }
 }
 
-/// Something that a user has to know of a volume that is used all the same.
+/// A remark on a volume that is used nevertheless.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Remark {
     /// File, series, slice or header element it is about, where it is not the whole input.
     pub place: Option<String>,
-    /// What was found and what was made of it, with value and unit.
+    /// What was found and how it was handled, with value and unit.
     pub message: String,
 }
 

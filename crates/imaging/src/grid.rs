@@ -18,10 +18,10 @@ pub enum NotAGrid {
     #[error("it is {} x {} x {} voxels", .0[0], .0[1], .0[2])]
     Empty([usize; 3]),
     /// More voxels than memory can hold.
-    #[error("{} x {} x {} voxels are more than can be counted", .0[0], .0[1], .0[2])]
+    #[error("{} x {} x {} voxels are too many", .0[0], .0[1], .0[2])]
     TooLarge([usize; 3]),
     /// Steps that are not finite, or that do not span space.
-    #[error("the steps between voxels do not span space, or are not finite")]
+    #[error("the voxel axes are linearly dependent or not finite")]
     Flat,
 }
 

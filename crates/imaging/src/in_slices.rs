@@ -7,16 +7,16 @@ use needlebench_parallel::in_parts;
 use crate::{ImagingError, VoxelGrid};
 
 /// Memory for a value per voxel.
-pub(crate) fn room_for<T: Clone + Default>(grid: &VoxelGrid) -> Result<Vec<T>, ImagingError> {
+pub fn room_for<T: Clone + Default>(grid: &VoxelGrid) -> Result<Vec<T>, ImagingError> {
     let mut values = Vec::new();
     values.try_reserve_exact(grid.len()).map_err(|_| {
         let [columns, rows, slices] = grid.size();
         let bytes = grid.len().saturating_mul(size_of::<T>());
         ImagingError::refused(format!(
-            "{columns} x {rows} x {slices} voxels need {} MB of memory, which is not to be had",
+            "{columns} x {rows} x {slices} voxels need {} MB of memory, which is not available",
             bytes / 1_000_000
         ))
-        .hint("fewer or larger voxels")
+        .hint("use fewer or larger voxels")
     })?;
     values.resize(grid.len(), T::default());
     Ok(values)
@@ -24,7 +24,7 @@ pub(crate) fn room_for<T: Clone + Default>(grid: &VoxelGrid) -> Result<Vec<T>, I
 
 /// Gives each slice to `work` with its number, in no order, on up to `threads` threads, each of which makes its first argument
 /// for itself by `make`.
-pub(crate) fn in_slices<T: Send, S>(
+pub fn in_slices<T: Send, S>(
     values: &mut [T],
     per_slice: usize,
     threads: usize,

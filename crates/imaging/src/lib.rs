@@ -1,4 +1,4 @@
-//! CT volumes: read, synthesised, segmented, turned into surfaces, and registered to the robot by markers.
+//! CT volumes: read, written, segmented, turned into surfaces, and registered to the robot by markers.
 //!
 //! Metres and Hounsfield units throughout. Frame `ct` is the patient's LPS: +x to the patient's left, +y posterior,
 //! +z towards the head; its axes are those of the frame `phantom`. An index (i, j, k) means a voxel's centre: column,
@@ -12,6 +12,7 @@ mod distance;
 mod error;
 mod grid;
 mod histogram;
+mod image_circle;
 mod in_slices;
 pub mod markers;
 mod mask;
@@ -26,7 +27,6 @@ mod serial;
 mod spacing;
 mod structures;
 mod surface;
-pub mod synth;
 mod volume;
 pub mod write;
 
@@ -35,6 +35,8 @@ pub use distance::{DistanceField, DistanceOptions};
 pub use error::{ImagingError, Remark};
 pub use grid::{NotAGrid, VoxelGrid};
 pub use histogram::HuHistogram;
+pub use image_circle::ImageCircle;
+pub use in_slices::{in_slices, room_for};
 pub use mask::{IndexBox, Mask};
 pub use morphology::{closed, dilated, eroded, opened};
 pub use orientation::{NoOrientation, Orientation};
@@ -49,5 +51,4 @@ pub use segment::{
 };
 pub use structures::{Structure, SurfaceTissue, structure_of};
 pub use surface::{Field, Level, SurfaceError, Values};
-pub(crate) use volume::AIR_HU;
-pub use volume::{LabelMap, Volume};
+pub use volume::{AIR_HU, LabelMap, Volume};

@@ -336,7 +336,7 @@ fn runs(words: &[u64], length: usize) -> impl Iterator<Item = [usize; 2]> + '_ {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     use super::*;
 

@@ -22,7 +22,8 @@ pub struct Orientation([(usize, f64); 3]);
 /// Three letters that are no orientation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "three letters are needed, one of L and R, one of P and A, one of S and I: LPS, RAS, LAS, ...; not '{0}'"
+    "three letters are required, one of L and R, one of P and A, one of S and I: LPS, RAS, LAS, \
+     ...; not '{0}'"
 )]
 pub struct NoOrientation(String);
 

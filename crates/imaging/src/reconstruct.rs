@@ -229,7 +229,7 @@ fn given_structures(
     if !unknown.is_empty() {
         remarks.push(
             Remark::new(format!(
-                "labels without a known meaning are left out: {}",
+                "labels without a known meaning are ignored: {}",
                 unknown.join(", ")
             ))
             .at("label map"),
@@ -590,7 +590,7 @@ fn make(volume: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Ma
         return Err(ImagingError::Interrupted);
     }
     let facts = check_closed(&coarse).map_err(|defect| {
-        ImagingError::refused(format!("its surface is not that of a solid: {defect}"))
+        ImagingError::refused(format!("its surface does not enclose a solid: {defect}"))
             .at(job.name.clone())
     })?;
     let index = SurfaceIndex::new(coarse);
@@ -650,7 +650,8 @@ fn keep_within_skin(surfaces: &mut [Surface], remarks: &mut Vec<Remark>) {
             surface.mesh = mesh;
             remarks.push(
                 Remark::new(format!(
-                    "{moved} corners of its surface, up to {:.2} mm outside the reduced skin, were moved back towards it",
+                    "{moved} vertices of its surface, up to {:.2} mm outside the reduced skin, \
+                     were moved back towards it",
                     1e3 * farthest_m
                 ))
                 .at(surface.name.clone()),
@@ -679,8 +680,8 @@ fn sort(
         if surface.error.p99_m > SURFACE_ERROR_M {
             remarks.push(
                 Remark::new(format!(
-                    "1 % of its surface is more than {:.2} mm from that of the voxels, which is the goal; it is {:.2} \
-                     mm at {} triangles",
+                    "P99 distance from the voxel surface is above the goal of {:.2} mm: {:.2} mm \
+                     with {} triangles",
                     1e3 * SURFACE_ERROR_M,
                     1e3 * surface.error.p99_m,
                     surface.mesh.triangles.len()
@@ -690,7 +691,7 @@ fn sort(
         }
         if surface.level_hu.is_none() {
             remarks.push(
-                Remark::new("its surface is that of a voxel mask, which is known to half a voxel")
+                Remark::new("its surface is from a voxel mask, accurate to half a voxel")
                     .at(job.name.clone()),
             );
         }

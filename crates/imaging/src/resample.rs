@@ -48,7 +48,8 @@ pub fn resample(
     if bytes > max_bytes {
         let [columns, rows, slices] = grid.size();
         return Err(ImagingError::refused(format!(
-            "along the patient's axes it takes {columns} x {rows} x {slices} voxels, {} MiB; the limit is {} MiB",
+            "along the patient's axes it has {columns} x {rows} x {slices} voxels, {} MiB; the \
+             limit is {} MiB",
             bytes.div_ceil(1 << 20),
             max_bytes >> 20
         ))
@@ -60,11 +61,11 @@ pub fn resample(
         let [columns, rows, slices] = grid.size();
         let how = if volume.grid.tilt_rad() > 1e-4 {
             format!(
-                "slices lean by {:.2} deg",
+                "slices are tilted by {:.2} deg",
                 volume.grid.tilt_rad().to_degrees()
             )
         } else {
-            "the volume lies obliquely".to_owned()
+            "the volume is oblique".to_owned()
         };
         Remark::new(format!(
             "{how}: interpolated to {columns} x {rows} x {slices} voxels of {x:.4} x {y:.4} x {z:.4} mm along the \
@@ -143,7 +144,7 @@ fn interpolated(
     let count = grid.len();
     let mut hu = Vec::new();
     hu.try_reserve_exact(count)
-        .map_err(|_| ImagingError::refused("this machine has no memory left for the voxels"))?;
+        .map_err(|_| ImagingError::refused("not enough memory for the voxels"))?;
     hu.resize(count, AIR_HU);
     let [columns, rows, _] = grid.size();
     let plane = columns * rows;

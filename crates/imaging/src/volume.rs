@@ -3,7 +3,7 @@
 use crate::VoxelGrid;
 
 /// Of air, and of what a scanner did not see: padding outside its circle.
-pub(crate) const AIR_HU: i16 = -1000;
+pub const AIR_HU: i16 = -1000;
 
 /// A CT volume.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,7 +12,7 @@ pub struct Volume {
     pub grid: VoxelGrid,
     /// One value per voxel, in the order of [`VoxelGrid::offset`]. Padding is air.
     pub hu: Vec<i16>,
-    /// Extent in m of what one slice integrates over, where it is known; the distance between slices may be less
+    /// Slice thickness in m, over which one slice integrates, where it is known; the slice spacing may be less
     /// (overlap) or more (gap).
     pub slice_thickness_m: Option<f64>,
 }

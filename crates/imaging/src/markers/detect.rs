@@ -280,7 +280,7 @@ fn judged(volume: &Volume, model: &MarkerModel, components: &[Seen]) -> Candidat
             if share > 0.5 * MASS_SHARES[0] {
                 rejected.push(Rejected {
                     at_m,
-                    reason: format!("its mass is {share:.2} times that of the marker"),
+                    reason: format!("its mass is {share:.2} times the marker's"),
                 });
             }
         } else if size_m > widest_m {

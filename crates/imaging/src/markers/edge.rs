@@ -1,6 +1,6 @@
 //! A plane edge as a scanner shows it.
 
-use needlebench_kinematics::normal;
+use needlebench_numerics::normal;
 
 /// Least standard deviation of an edge, mm: no slice's profile is sharper.
 const SHARPEST_MM: f64 = 0.1;

@@ -96,7 +96,8 @@ impl<'a> Scan<'a> {
         let possible_mm = stated_mm.filter(|t| POSSIBLE_MM.contains(t));
         let thickness_mm = possible_mm.unwrap_or_else(|| {
             remarks.push(Remark::new(format!(
-                "no possible thickness of slices is stated; {increment_mm:.2} mm, their distance, is taken for it"
+                "no plausible slice thickness is stated; the slice spacing, {increment_mm:.2} mm, \
+                 is used"
             )));
             increment_mm.clamp(*POSSIBLE_MM.start(), *POSSIBLE_MM.end())
         });
@@ -190,7 +191,7 @@ pub(crate) fn localise(
     // Around where it is, not around where it seemed to be.
     let center = values.fixed_rows::<3>(0).into_owned();
     if center.norm() > reach_mm + FARTHEST_MM {
-        return Err(format!("the fit ends {:.1} mm away", center.norm()));
+        return Err(format!("the fit converges {:.1} mm away", center.norm()));
     }
     let seed = seed + scan.ct_from_slice * center * 1e-3;
     values.fixed_rows_mut::<3>(0).fill(0.0);
@@ -222,7 +223,7 @@ fn outward(
     );
     let length = sum.norm();
     if length <= 0.0 {
-        return Err("there is no skin beside it".to_owned());
+        return Err("there is no skin next to it".to_owned());
     }
     let outward = -sum / length;
     Ok(match model.dense {
@@ -496,7 +497,7 @@ impl Task<'_> {
         let hu = values[unknown::DENSE] * 1e3;
         let tissue_hu = values[unknown::TISSUE] * 1e3;
         if center.norm() > reach_mm {
-            return Err(format!("the fit goes {:.1} mm away", center.norm()));
+            return Err(format!("the fit moves {:.1} mm away", center.norm()));
         }
         let largest = options.largest_misfit + 2.0 * Self::noise_share(values, noise);
         if misfit.is_nan() || misfit > largest {
@@ -510,14 +511,14 @@ impl Task<'_> {
         let least = (0.4 * self.of.marker.hu).max(150.0);
         if hu < least {
             return Err(format!(
-                "its dense part is of {hu:.0} HU, {least:.0} at least"
+                "its dense part has {hu:.0} HU, at least {least:.0} required"
             ));
         }
         if !(0.3 * self.of.marker.height_m * 1e3 - 2.0..=self.of.marker.height_m * 1e3 + 3.0)
             .contains(&values[unknown::HEIGHT])
         {
             return Err(format!(
-                "it lies {:.1} mm over the skin",
+                "it is {:.1} mm above the skin",
                 values[unknown::HEIGHT]
             ));
         }
@@ -530,8 +531,8 @@ impl Task<'_> {
             && chi_square > ODD_CHI_SQUARE
         {
             remarks.push(Remark::new(format!(
-                "the residuals are {:.1} times the noise: streaks of metal, something that touches it, or another shape \
-                 than the model's",
+                "the residuals are {:.1} times the noise: metal streaks, an object in contact with \
+                 it, or a shape other than the model's",
                 chi_square.sqrt()
             )));
         }
@@ -650,8 +651,8 @@ impl Task<'_> {
         let sd_mm = covariance[(2, 2)].sqrt();
         if sd_mm > OPEN_MM {
             remarks.push(Remark::new(format!(
-                "its place across the slices is not to be had: {sd_mm:.1} mm (standard deviation); {size_mm:.1} mm of \
-                 marker in slices of {:.1} mm every {:.1} mm",
+                "its position across the slices is too uncertain: {sd_mm:.1} mm (standard \
+                 deviation); marker of {size_mm:.1} mm, slices {:.1} mm thick, spacing {:.1} mm",
                 scan.thickness_mm, scan.increment_mm
             )));
         }

@@ -167,7 +167,8 @@ impl MarkerModel {
         }
         if !(-500.0..=30_000.0).contains(&self.hu) || !(0.0..=50e-3).contains(&self.height_m) {
             return Err(ImagingError::refused(format!(
-                "a marker of {} HU, its centre {:.1} mm over the skin: -500 to 30000 HU and 0 to 50 mm are possible",
+                "a marker of {} HU with its centre {:.1} mm above the skin is outside -500 to \
+                 30000 HU and 0 to 50 mm",
                 self.hu,
                 self.height_m * 1e3
             )));
@@ -396,7 +397,7 @@ pub fn find_markers(
         }
         if rank >= options.most_candidates {
             remarks.push(Remark::new(format!(
-                "{} candidates beyond the likeliest {} were not looked at",
+                "{} candidates beyond the {} most likely were not evaluated",
                 candidates.seeds.len() - rank,
                 options.most_candidates
             )));
@@ -425,7 +426,7 @@ fn check_options(options: &Options) -> Result<(), ImagingError> {
         || options.largest_misfit <= 0.0
     {
         return Err(ImagingError::refused(format!(
-            "a blur of {:.3} mm or a largest misfit of {}: the blur is 0.1 to 3 mm, the misfit above 0",
+            "a blur of {:.3} mm or a maximum misfit of {} is outside 0.1 to 3 mm, or not above 0",
             options.blur_sigma_m * 1e3,
             options.largest_misfit
         )));

@@ -287,7 +287,7 @@ fn flat(volume: &Volume, [i, j, k]: [usize; 3]) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use nalgebra::Point3;
-    use needlebench_kinematics::random::NormalPairs;
+    use needlebench_numerics::random::NormalPairs;
 
     use super::*;
     use crate::VoxelGrid;

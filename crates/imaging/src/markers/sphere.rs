@@ -1,6 +1,6 @@
 //! A ball as a scanner shows it: blurred across the slice by a Gaussian, along its normal by the slice's profile.
 
-use needlebench_kinematics::normal;
+use needlebench_numerics::normal;
 
 /// Distance between the columns of a table, mm: 0.2 % of the density is what interpolation is off by.
 const ACROSS_MM: f64 = 0.1;

@@ -27,11 +27,11 @@ pub fn read_label_names(path: &Path) -> Result<Vec<(u16, String)>, ImagingError>
         .map_err(|error| refused(format!("cannot be read: {error}")))?;
     if size.len() > MOST_BYTES {
         return Err(refused(
-            "it is larger than 1 MiB: no table of names".to_owned(),
+            "it is larger than 1 MiB: not a table of names".to_owned(),
         ));
     }
     let bytes = std::fs::read(path).map_err(|error| refused(format!("cannot be read: {error}")))?;
-    let text = String::from_utf8(bytes).map_err(|_| refused("it is no text".to_owned()))?;
+    let text = String::from_utf8(bytes).map_err(|_| refused("it is not text".to_owned()))?;
     let text = text.trim_start_matches('\u{feff}');
     let found = if text.trim_start().starts_with(['{', '[']) {
         from_json(text)
@@ -44,7 +44,7 @@ pub fn read_label_names(path: &Path) -> Result<Vec<(u16, String)>, ImagingError>
             && other != name
         {
             return Err(refused(format!(
-                "label {label} is called `{other}` and `{name}`"
+                "label {label} is named `{other}` and `{name}`"
             )));
         }
     }

@@ -111,14 +111,14 @@ impl Order {
         });
         let what = if nearest_m.is_finite() {
             format!(
-                "corners of its voxels are up to {:.3} mm from the CT's",
+                "its voxel corners are up to {:.3} mm from the CT's",
                 nearest_m * 1e3
             )
         } else {
-            format!("it is {a} voxels, the CT {b}")
+            format!("it has {a} voxels, the CT {b}")
         };
         Err(
-            ImagingError::refused(format!("the label map is of another volume: {what}"))
+            ImagingError::refused(format!("the label map belongs to another volume: {what}"))
                 .hint("export it in the geometry of the CT"),
         )
     }

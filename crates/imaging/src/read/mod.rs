@@ -1,6 +1,6 @@
 //! Volumes and label maps from NIfTI and DICOM.
 //!
-//! Headers are read first: what they ask for is held against the file and against a limit before memory is taken.
+//! Headers are read first: the memory that they require is checked against the file and a limit before allocation.
 //! Where a file leaves room for a guess it is refused; what is used although something about it is odd comes with a
 //! [`Remark`].
 
@@ -58,13 +58,11 @@ impl ReadOptions {
         }
         let [columns, rows, slices] = grid.size();
         Err(ImagingError::refused(format!(
-            "{columns} x {rows} x {slices} voxels take {} of memory, the limit is {}",
+            "{columns} x {rows} x {slices} voxels need {} of memory, the limit is {}",
             in_mib(bytes),
             in_mib(self.max_bytes)
         ))
-        .hint(
-            "crop it or take every second voxel beforehand, or raise the limit with --max-memory",
-        ))
+        .hint("crop or subsample it beforehand, or raise the limit with --max-memory"))
     }
 }
 
@@ -78,10 +76,10 @@ fn reserved<T>(count: usize) -> Result<Vec<T>, ImagingError> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).map_err(|_| {
         ImagingError::refused(format!(
-            "this machine has no {} of memory left for the voxels",
+            "not enough memory for the voxels ({})",
             in_mib((count * size_of::<T>()) as u64)
         ))
-        .hint("crop it or take every second voxel beforehand")
+        .hint("crop or subsample it beforehand")
     })?;
     Ok(values)
 }
@@ -113,7 +111,7 @@ pub struct Description {
     pub modality: Option<String>,
     /// Label of the series within its folder.
     pub series: Option<String>,
-    /// Reconstruction kernel, by its maker's name.
+    /// Reconstruction kernel, by its manufacturer's name.
     pub kernel: Option<String>,
     /// Peak voltage of the tube.
     pub tube_voltage_v: Option<f64>,
@@ -155,7 +153,7 @@ pub fn read_volume(
 #[expect(clippy::needless_pass_by_value, reason = "errors are mapped by it")]
 fn unreadable(error: std::io::Error) -> ImagingError {
     ImagingError::refused(format!("cannot be read: {error}"))
-        .hint("check that it is there, whole, and yours to read")
+        .hint("check that it exists, is complete and readable")
 }
 
 /// What a path holds, by its first bytes.
@@ -185,7 +183,7 @@ fn format_of(path: &Path) -> Result<Format, ImagingError> {
         Ok(Format::Nifti)
     } else {
         Err(
-            ImagingError::refused("it is neither NIfTI nor DICOM by its first bytes")
+            ImagingError::refused("its first bytes are neither NIfTI nor DICOM")
                 .hint("a CT is read from .nii, .nii.gz, .hdr with .img, a DICOM file, or a folder of DICOM files"),
         )
     }
@@ -198,9 +196,9 @@ fn read_nifti(
 ) -> Result<ReadVolume, ImagingError> {
     if let Some(series) = &options.series {
         return Err(ImagingError::refused(format!(
-            "series {series} is asked for, but a NIfTI file holds one volume"
+            "series {series} is requested, but a NIfTI file has one volume"
         ))
-        .hint("leave out --series"));
+        .hint("omit --series"));
     }
     let nifti = Nifti::open(path, options)?;
     let mut remarks = nifti.remarks().to_vec();

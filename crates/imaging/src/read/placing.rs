@@ -29,7 +29,7 @@ pub(super) fn centred(
     VoxelGrid::new(size, steps, Point3::from(-(steps * half)))
 }
 
-/// Refuses distances that are those of another unit, and remarks on those that nobody measured.
+/// Rejects spacings of another unit, and remarks on those that are probably defaults.
 pub(super) fn within_reason(
     grid: &VoxelGrid,
     is_mm: bool,
@@ -40,21 +40,22 @@ pub(super) fn within_reason(
         let extent_m = spacing_m[axis] * grid.size()[axis] as f64;
         if !(SPACING_M[0]..=SPACING_M[1]).contains(&spacing_m[axis]) || extent_m > EXTENT_M {
             return Err(ImagingError::refused(format!(
-                "voxels are {:.6} mm apart along {name}, {:.3} m in all: no CT is",
+                "a voxel spacing of {:.6} mm along {name}, {:.3} m in total, is implausible for a \
+                 CT",
                 spacing_m[axis] * 1e3,
                 extent_m
             ))
             .hint(if is_mm {
-                "correct the affine of the header, which counts in mm"
+                "correct the affine in the header, which is in mm"
             } else {
-                "correct the unit of length in the header (xyzt_units): most affines count in mm"
+                "correct the unit of length in the header (xyzt_units): most affines are in mm"
             }));
         }
     }
     if spacing_m.iter().all(|each| (each - 1e-3).abs() < 1e-9) {
         remarks.push(Remark::new(
-            "voxels are exactly 1 x 1 x 1 mm, which some programs write when they do not know: \
-             hold it against a length that you know",
+            "voxels are exactly 1 x 1 x 1 mm, which some programs write for an unknown spacing: \
+             check a known length",
         ));
     }
     Ok(())

@@ -25,10 +25,11 @@ pub(super) fn remarks(volume: &Volume, tally: &Tally) -> Vec<Remark> {
     say(
         tally.padding,
         &format!(
-            "are padding or below {UNSEEN_BELOW_HU} HU: the scanner did not see there, taken as air ({AIR_HU} HU)"
+            "are padding or below {UNSEEN_BELOW_HU} HU, outside the field of view: set to air \
+             ({AIR_HU} HU)"
         ),
     );
-    say(tally.not_numbers, "are not numbers: taken as air");
+    say(tally.not_numbers, "are not numbers: set to air");
     say(tally.rounded, "are not whole HU: rounded");
     say(
         tally.clipped,
@@ -36,12 +37,13 @@ pub(super) fn remarks(volume: &Volume, tally: &Tally) -> Vec<Remark> {
     );
     let [least, greatest] = tally.range_hu;
     if greatest < least {
-        remarks.push(Remark::new("no voxel was measured: all is padding"));
+        remarks.push(Remark::new("no voxel was measured: all are padding"));
         return remarks;
     }
     if least < BELIEVABLE_HU[0] || greatest > BELIEVABLE_HU[1] {
         remarks.push(Remark::new(format!(
-            "values reach from {least:.0} to {greatest:.0} HU, which no CT has: are slope and intercept right?"
+            "values range from {least:.0} to {greatest:.0} HU, implausible for a CT: check slope \
+             and intercept"
         )));
     }
     #[expect(
@@ -53,8 +55,8 @@ pub(super) fn remarks(volume: &Volume, tally: &Tally) -> Vec<Remark> {
         let count = volume.hu.iter().filter(|hu| **hu == top).count();
         if count >= A_PLATEAU {
             remarks.push(Remark::new(format!(
-                "{count} voxels have the greatest value of 12 bits, {top} HU: what is denser, as metal is, was clipped \
-                 by the scanner"
+                "{count} voxels have the maximum 12-bit value, {top} HU: denser material, such as \
+                 metal, was clipped by the scanner"
             )));
         }
     }
@@ -69,7 +71,7 @@ fn air(volume: &Volume) -> Option<Remark> {
     }
     Some(Remark::new(match histogram.air_peak_hu() {
         Some(peak) => format!(
-            "what looks like air is at {peak} HU, and not within 60 of -1000: are these Hounsfield units?"
+            "the air peak is at {peak} HU, more than 60 from -1000: are these Hounsfield units?"
         ),
         None => {
             "there is no air (nothing near -1000 HU): is it a CT in Hounsfield units?".to_owned()

@@ -135,8 +135,8 @@ pub fn match_markers(
     }
     if mirror.is_some() {
         remarks.push(Remark::new(
-            "the markers are their own mirror image as far as they are known: a volume with left and right \
-             exchanged would not be noticed by them",
+            "the marker layout is mirror-symmetric within its uncertainty: it cannot detect \
+             exchanged left and right",
         ));
     }
     let used = |of: fn(&MatchedPair) -> usize, index| best.pairs.iter().any(|p| of(p) == index);
@@ -169,7 +169,7 @@ fn check(
     let positive = |value: f64| value > 0.0 && value.is_finite();
     if !positive(options.placement_sigma_m) || !positive(options.left_out_chi_square) {
         return Err(ImagingError::refused(format!(
-            "placement sigma {} m and chi-square of a marker left out {} have to be above 0",
+            "placement sigma {} m and chi-square of an omitted marker {} must be above 0",
             options.placement_sigma_m, options.left_out_chi_square
         )));
     }
@@ -223,17 +223,17 @@ fn check(
 
 fn too_few(detected: usize, reference: usize) -> ImagingError {
     ImagingError::refused(format!(
-        "of {detected} detected and {reference} known markers fewer than {FEWEST_FIDUCIALS} fit one another"
+        "fewer than {FEWEST_FIDUCIALS} of {detected} detected and {reference} known markers match"
     ))
     .hint(
-        "three that are not on one line are the least; compare the distances between the detected markers with those \
-         of the list, and its unit",
+        "at least three that are not collinear are required; compare the distances between the \
+         detected markers with those of the list, and its unit",
     )
 }
 
 fn mirror_error(mirror: &Candidate) -> ImagingError {
     ImagingError::refused(format!(
-        "the markers are those of the list in a mirror: {} of them fit with left and right exchanged",
+        "the markers match the mirrored list: {} of them fit with left and right exchanged",
         mirror.pairs.len()
     ))
     .hint(
@@ -262,17 +262,18 @@ fn judge(
         })
         .collect();
     let message = format!(
-        "another match fits nearly as well, {:.1} sigma worse: {}",
+        "another match is only {:.1} sigma worse: {}",
         second.separation_sigmas,
         differing.join(", ")
     );
     if second.separation_sigmas < TOSS_SIGMAS {
         return Err(ImagingError::refused(message).hint(
-            "the layout of the markers, or of those detected, has a symmetry: move one marker, or detect more of them",
+            "the layout of the markers, or of those detected, is symmetric: move one marker, or \
+             detect more of them",
         ));
     }
     if second.separation_sigmas < CERTAIN_SIGMAS {
-        remarks.push(Remark::new(format!("{message}; the match is not certain")));
+        remarks.push(Remark::new(format!("{message}; the match is ambiguous")));
     }
     Ok(())
 }
@@ -460,11 +461,11 @@ impl<'a> Search<'a> {
         state.steps += 1;
         if state.steps > MOST_STEPS {
             return Err(ImagingError::refused(format!(
-                "the distances between {} detected and {} known markers agree in too many ways",
+                "the distances between {} detected and {} known markers match in too many ways",
                 self.detected.len(),
                 self.known.len()
             ))
-            .hint("place markers at unequal distances, or leave out false detections"));
+            .hint("place markers at unequal distances, or remove false detections"));
         }
         let price = self.left_out * state.missing as f64;
         if price + chi_square.unwrap_or(0.0) >= state.limit {

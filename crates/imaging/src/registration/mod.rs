@@ -89,7 +89,10 @@ fn refused(
         E::Collinear { .. } | E::Undetermined => {
             refused.hint("place one marker well off the line through the others")
         }
-        E::TooFew { .. } => refused.hint("three markers that are not on one line are the least"),
+        E::TooFew { .. } => refused.hint(
+            "at least three markers that are not collinear are \
+                                          required",
+        ),
         _ => refused,
     }
 }

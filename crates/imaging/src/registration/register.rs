@@ -1,10 +1,11 @@
 //! The transform, what it leaves, and what it is good for.
 
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3};
+use needlebench_kinematics::Pose;
 use needlebench_kinematics::registration::{
     self as rigid, Localised, Residual, WeightedFit, displacement_covariance, leave_one_out,
 };
-use needlebench_kinematics::{Pose, chi_square, normal};
+use needlebench_numerics::{chi_square, normal};
 use serde::{Deserialize, Serialize};
 
 use super::{MarkerMatch, ReferenceMarker, refused};
@@ -196,7 +197,8 @@ fn check_turn(fit: &WeightedFit) -> Result<(), ImagingError> {
         return Ok(());
     }
     Err(ImagingError::refused(format!(
-        "the markers leave a turn open: its standard deviation is {:.0} deg; as far as they are known they lie on a line",
+        "the markers do not determine the rotation (standard deviation {:.0} deg): they are \
+         collinear within their uncertainty",
         sigma_rad.to_degrees()
     ))
     .hint("place one marker well off the line through the others"))
@@ -220,13 +222,12 @@ fn verdict(
     name: &impl Fn(usize) -> String,
 ) -> (Vec<String>, Vec<Remark>) {
     let mut remarks = vec![Remark::new(
-        "the residuals of markers (FRE) tell how well they agree with one another, not how far off the target is: FRE \
-         does not predict TRE; judge by the error at the target",
+        "the marker residuals (FRE) do not predict the target registration error (TRE): use the TRE",
     )];
     let count = left_out.len();
     if left_out.iter().all(Option::is_none) {
         remarks.push(Remark::new(format!(
-            "with {count} markers there is no telling whether one has moved: a fourth is needed"
+            "with {count} markers a moved marker cannot be detected: a fourth is required"
         )));
     }
     let mut order: Vec<(usize, &Residual)> = left_out
@@ -251,16 +252,17 @@ fn verdict(
         ([_, _, ..], _) => {
             let names: Vec<String> = suspects.iter().map(|&index| name(index)).collect();
             remarks.push(Remark::new(format!(
-                "one of {} is not where the list says; which one cannot be told",
+                "one of {} is not at its position in the list; which one cannot be determined",
                 names.join(", ")
             )));
         }
         _ if probability < FALSE_ALARM => remarks.push(Remark::new(format!(
-            "the residuals are {scale:.1} times what the stated errors allow, at no marker in particular: the stated \
-             errors are too small, and so is the error at the target"
+            "the residuals are {scale:.1} times what the stated errors allow, at no particular \
+             marker: the stated errors, and so the TRE, are too small"
         ))),
         _ if probability > 1.0 - FALSE_ALARM => remarks.push(Remark::new(format!(
-            "the residuals are {scale:.1} times what the stated errors lead to: those are too large"
+            "the residuals are {scale:.1} times the expected ones: the stated errors are too \
+             large"
         ))),
         _ => {}
     }
@@ -272,8 +274,8 @@ fn verdict(
         ) < FALSE_ALARM
     {
         remarks.push(Remark::new(
-            "without the worst marker the others do not agree either: more than one has moved, or the stated errors are \
-             too small",
+            "the markers disagree even without the worst one: more than one has moved, or the \
+             stated errors are too small",
         ));
     }
     (suspects.into_iter().map(name).collect(), remarks)
@@ -282,8 +284,8 @@ fn verdict(
 fn moved_remark(index: usize, left: &Residual, name: &impl Fn(usize) -> String) -> Remark {
     let mm = left.error_m * 1e3;
     Remark::new(format!(
-        "is not where the list says: by the other markers it is ({:+.2}, {:+.2}, {:+.2}) mm from there; it has moved, or \
-         was not detected well: leave it out or measure it again",
+        "is not at its position in the list: by the other markers it is ({:+.2}, {:+.2}, {:+.2}) \
+         mm from it; it has moved or was poorly detected: omit it or measure it again",
         mm.x, mm.y, mm.z
     ))
     .at(name(index))

@@ -1,7 +1,7 @@
 //! Registrations of made-up markers: what they say of moved ones, and that their error is the simulated one.
 
 use nalgebra::{Translation3, UnitQuaternion};
-use needlebench_kinematics::random::NormalPairs;
+use needlebench_numerics::random::NormalPairs;
 
 use super::*;
 use crate::registration::MatchedPair;
@@ -134,7 +134,7 @@ fn few_markers_say_what_they_cannot_tell() {
         three
             .remarks
             .iter()
-            .any(|r| r.message.contains("a fourth is needed"))
+            .any(|r| r.message.contains("a fourth is required"))
     );
     reference[1].center_m.x += 4e-3;
     let four = registered(&detected, &reference);
@@ -190,7 +190,7 @@ fn markers_on_a_line_as_far_as_they_are_known_are_refused() {
         refusal
             .unwrap_err()
             .to_string()
-            .contains("leave a turn open")
+            .contains("do not determine the rotation")
     );
 }
 

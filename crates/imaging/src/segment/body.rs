@@ -1,4 +1,4 @@
-//! The patient without the bed.
+//! The patient without the couch.
 
 use crate::components::{Components, Connectivity};
 use crate::error::{ImagingError, Remark};
@@ -11,7 +11,7 @@ use super::{Scan, below, side_in_words};
 /// Between air (-1000) and skin (+40), where the blur of the scanner leaves the surface. Half-integer: no voxel is on it.
 pub(crate) const SKIN_LEVEL_HU: f64 = -479.5;
 
-/// What is thinner than twice this is cut off: the shell of a bed, tubes, blankets.
+/// What is thinner than twice this is cut off: the shell of a couch, tubes, blankets.
 const BED_HALF_THICKNESS_M: f64 = 3e-3;
 
 /// A patient, or a phantom, is not smaller.
@@ -29,7 +29,7 @@ const CUT_LUNG_L: f64 = 0.05;
 /// Area of contact, or of a cut, that is worth a remark.
 const WORTH_MENTIONING_M2: f64 = 1e-4;
 
-/// The patient without the bed, with all that the skin encloses.
+/// The patient without the couch, with all that the skin encloses.
 #[derive(Debug, Clone)]
 pub struct Body {
     /// Its voxels.
@@ -40,7 +40,7 @@ pub struct Body {
     pub centroid: [f64; 3],
     /// Where the field of view cuts it (`left`, `anterior`, ...) other than at the first and last slice.
     pub cut_sides: Vec<&'static str>,
-    /// Area at which its surface touches something else that is not air, such as the bed, m^2. There the surface is
+    /// Area at which its surface touches something else that is not air, such as the couch, m^2. There the surface is
     /// known to half a voxel only.
     pub contact_m2: f64,
 }
@@ -60,8 +60,8 @@ pub(super) fn find(scan: &Scan<'_>, remarks: &mut Vec<Remark>) -> Result<Body, I
     let contact_m2 = contact_m2(scan, &mask, &others);
     if contact_m2 > WORTH_MENTIONING_M2 {
         remarks.push(Remark::new(format!(
-            "the skin touches something else (bed, marker, cushion) over {:.0} cm2: there its surface is known to half \
-             a voxel only",
+            "the skin is in contact with another object (couch, marker, cushion) over {:.0} cm2, \
+             where its surface is accurate to half a voxel only",
             1e4 * contact_m2
         )));
     }
@@ -77,7 +77,7 @@ pub(super) fn find(scan: &Scan<'_>, remarks: &mut Vec<Remark>) -> Result<Body, I
 
 fn nothing_there() -> ImagingError {
     ImagingError::refused(format!(
-        "nothing of {LEAST_BODY_L} l is denser than {SKIN_LEVEL_HU} HU"
+        "no region of {LEAST_BODY_L} l is denser than {SKIN_LEVEL_HU} HU"
     ))
     .hint("is this a CT of a patient, in Hounsfield units?")
 }
@@ -122,8 +122,8 @@ fn without_bed(
         }
         if radius_m < BED_HALF_THICKNESS_M {
             remarks.push(Remark::new(format!(
-                "the body is mostly thinner than {:.0} mm (a shell?): only what is thinner than {:.0} mm was cut off, \
-                 and the bed may be part of the body",
+                "the body is mostly thinner than {:.0} mm (a shell?): only parts thinner than \
+                 {:.0} mm were removed, and the couch may be part of the body",
                 2e3 * BED_HALF_THICKNESS_M,
                 2e3 * radius_m
             )));
@@ -153,8 +153,8 @@ fn note_others(scan: &Scan<'_>, parts: &Components, body: usize, remarks: &mut V
                 .grid
                 .ct_from_index(&nalgebra::Point3::new(i, j, k));
         remarks.push(Remark::new(format!(
-            "something of {litres:.1} l at [{:.0}, {:.0}, {:.0}] mm is not connected to the body and is left out (an \
-             arm, the bed?)",
+            "a region of {litres:.1} l at [{:.0}, {:.0}, {:.0}] mm is not connected to the body \
+             and is ignored (an arm, the couch?)",
             at.x, at.y, at.z
         )));
     }
@@ -190,8 +190,8 @@ fn filled(scan: &Scan<'_>, solid: &Mask, remarks: &mut Vec<Remark>) -> Mask {
                 && scan.litres(each.voxels) > CUT_LUNG_L;
             if at_side && lung_like {
                 remarks.push(Remark::new(format!(
-                    "{:.1} l of air that touches the border of the volume was taken for a lung that the field of view \
-                     cuts",
+                    "{:.1} l of air at the border of the volume was classified as a lung cut by \
+                     the field of view",
                     scan.litres(each.voxels)
                 )));
             }
@@ -277,8 +277,8 @@ fn cut_sides(scan: &Scan<'_>, solid: &Mask, remarks: &mut Vec<Remark>) -> Vec<&'
         if area_m2 > WORTH_MENTIONING_M2 {
             let side = side_in_words(scan.volume, face / 2, face % 2 == 1);
             remarks.push(Remark::new(format!(
-                "the field of view cuts the body on its {side} side, over {:.0} cm2: the skin is not seen there, and \
-                 the surface ends at the cut",
+                "the field of view cuts the body on its {side} side, over {:.0} cm2: the skin is \
+                 missing there, and the surface ends at the cut",
                 1e4 * area_m2
             )));
             sides.push(side);

@@ -95,7 +95,7 @@ pub(super) fn find(
     contrast.subtract(&bone);
     if bone.is_empty() {
         remarks.push(Remark::new(format!(
-            "no bone was found: nothing in the body is denser than {SURE_HU} HU"
+            "no bone found: nothing in the body is denser than {SURE_HU} HU"
         )));
     }
     Ok(Bone {
@@ -203,16 +203,17 @@ fn note_unsure(scan: &Scan<'_>, parts: &Components, kinds: &[Kind], remarks: &mu
     let contrast_l = sum(Kind::Contrast);
     if contrast_l > UNSURE_L {
         remarks.push(Remark::new(format!(
-            "{:.0} ml between the lungs are dense like blood with contrast medium (over {BONE_LEVEL_HU} HU, not \
-             {CORTICAL_HU}): taken for vessels, which is a guess by place and density",
+            "{:.0} ml between the lungs have the density of contrast-enhanced blood (above \
+             {BONE_LEVEL_HU} HU, below {CORTICAL_HU}): classified as vessels, assumed from location \
+             and density",
             1e3 * contrast_l
         )));
     }
     let unsure_l = sum(Kind::Unsure);
     if unsure_l > UNSURE_L {
         remarks.push(Remark::new(format!(
-            "{:.0} ml of what was taken for bone have nearly nothing above {CORTICAL_HU} HU: it may be vessels with \
-             contrast medium",
+            "{:.0} ml classified as bone are almost entirely below {CORTICAL_HU} HU: possibly \
+             contrast-enhanced vessels",
             1e3 * unsure_l
         )));
     }

@@ -198,11 +198,11 @@ impl<'a> Grower<'a> {
                 Ok(())
             }
             None => Err(ImagingError::refused(format!(
-                "the point is in air, {} HU, and nothing denser is within {:.0} mm",
+                "the point is in air, {} HU, with nothing denser within {:.0} mm",
                 self.hu(self.at),
                 1e3 * BESIDE_M
             ))
-            .hint("point at the middle of the lesion")),
+            .hint("set the point at the centre of the lesion")),
         }
     }
 
@@ -236,8 +236,8 @@ impl<'a> Grower<'a> {
             mask = component_at(&mask, top);
             remarks.push(
                 Remark::new(format!(
-                    "it runs into what is around it at {level_hu} HU: bounded by a ball of {:.0} mm; its size is not \
-                     known",
+                    "it merges with its surroundings at {level_hu} HU: limited to a sphere of \
+                     {:.0} mm; its size is unknown",
                     4e3 * radius_m
                 ))
                 .at(place(self.seed)),
@@ -284,10 +284,10 @@ impl<'a> Grower<'a> {
         let contrast = f64::from(self.median_hu) - f64::from(around_hu);
         if contrast < LEAST_CONTRAST_HU {
             return Err(ImagingError::refused(format!(
-                "at {} HU it cannot be told from what is around it at {around_hu} HU",
+                "at {} HU it cannot be separated from its surroundings at {around_hu} HU",
                 self.median_hu
             ))
-            .hint("take its outline from a label map"));
+            .hint("use a label map for its outline"));
         }
         Ok((f64::from(around_hu) + 0.5 * contrast).floor() + 0.5)
     }

@@ -97,7 +97,7 @@ pub(super) fn find(
     };
     let Some(air_hu) = lungs.air_hu else {
         remarks.push(Remark::new(format!(
-            "no lungs were found: no enclosed air of {LEAST_LUNG_L} l"
+            "no lungs found: no enclosed air of {LEAST_LUNG_L} l"
         )));
         return Ok(lungs);
     };
@@ -152,10 +152,10 @@ fn separate(lungs: &mut Lungs, airy: &Mask) {
 fn note_missing(scan: &Scan<'_>, lungs: &Lungs, remarks: &mut Vec<Remark>) {
     match &lungs.lungs[..] {
         [] => remarks.push(Remark::new(format!(
-            "no lung with {LEAST_LUNG_L} l of air was found"
+            "no lung with {LEAST_LUNG_L} l of air found"
         ))),
         [lung] => remarks.push(Remark::new(format!(
-            "one lung was found, at the patient's {} side",
+            "one lung found, on the patient's {} side",
             match lung.side {
                 Side::Left => "left",
                 Side::Right => "right",
@@ -194,7 +194,7 @@ fn airways(
     let contrast = lung_hu.saturating_add(1000);
     if contrast < AIRWAY_CONTRAST_HU {
         remarks.push(Remark::new(format!(
-            "the air in the lungs is at {lung_hu} HU, like that of the airways: these were not told apart"
+            "the air in the lungs is at {lung_hu} HU, as in the airways: they were not separated"
         )));
         return none;
     }
@@ -213,7 +213,7 @@ fn airways(
     let inside = parts.mask_of(is_airway);
     if inside.is_empty() {
         remarks.push(Remark::new(
-            "no airways were found: they may be part of the lungs",
+            "no airways found: they may be part of the lungs",
         ));
         return none;
     }
@@ -295,7 +295,7 @@ fn sides(
         scan.check()?;
         let (halves, how) = split(scan, &mask, axis, middle)?;
         remarks.push(Remark::new(format!(
-            "the lungs are connected; they were parted {how}"
+            "the lungs are connected; they were separated {how}"
         )));
         for half in halves {
             let beyond = share_beyond(&half, axis, middle) > 0.5;
@@ -375,7 +375,7 @@ fn split(
     }
     Ok((
         halves,
-        "at the middle of the body, because their connection is wide".to_owned(),
+        "at the midline of the body, because their connection is wide".to_owned(),
     ))
 }
 

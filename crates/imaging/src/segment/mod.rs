@@ -27,7 +27,7 @@ pub use lungs::{Lung, Lungs, Side};
 /// What is in a volume.
 #[derive(Debug, Clone)]
 pub struct Segmentation {
-    /// The patient without the bed.
+    /// The patient without the couch.
     pub body: Body,
     /// Lungs, airways, vessels in the lungs.
     pub lungs: Lungs,

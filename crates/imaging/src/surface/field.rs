@@ -27,7 +27,7 @@ pub enum Values<'a> {
         /// Where the surface is, HU.
         level: Level<'a>,
         /// Typical of the inside and the outside, HU: stand for voxels that are on the other side of the level than
-        /// the mask says, such as a bed's or a vessel's in the lung.
+        /// the mask says, such as a couch's or a vessel's in the lung.
         typical: [f32; 2],
     },
     /// Nothing but the mask, which is smoothed by (1 2 1)/4 along each axis: the surface of a voxel mask is known to

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use nalgebra::{Point3, Vector3};
 use needlebench_geometry::TriangleMesh;
 use needlebench_geometry::mesh::{SurfaceIndex, check_closed, volume_m3};
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 
 use super::*;
 use crate::grid::VoxelGrid;

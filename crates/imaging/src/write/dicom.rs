@@ -1,6 +1,6 @@
 //! A series of CT images: explicit little endian, one file a slice.
 //!
-//! Only what the standard asks of CT images, and what says how the slices lie. The patient is nobody; no date or time is given.
+//! Only what the standard requires of CT images, and the slice geometry. The patient is anonymous; no date or time.
 //! The same volume has the same identifiers.
 
 use std::ffi::OsStr;
@@ -11,14 +11,13 @@ use std::sync::atomic::AtomicBool;
 use sha2::{Digest, Sha256};
 
 use super::file::{go_on, write_whole};
-use crate::synth::is_outside_circle;
-use crate::{ImagingError, Volume};
+use crate::{ImageCircle, ImagingError, Volume};
 
 const EXPLICIT_LITTLE_ENDIAN: &str = "1.2.840.10008.1.2.1";
 const CT_IMAGE_STORAGE: &str = "1.2.840.10008.5.1.4.1.1.2";
 /// Stored values are Hounsfield units less this, as of most scanners.
 const INTERCEPT_HU: i16 = -1024;
-/// Stored where the scanner did not see: no value that it measures, in a usual choice of the makers.
+/// Stored outside the field of view: a value that is never measured, as manufacturers usually choose it.
 const PADDING: i16 = -2000;
 
 /// What a series says of itself besides its voxels.
@@ -47,7 +46,7 @@ pub fn write_dicom(
     cancel: &AtomicBool,
 ) -> Result<(), ImagingError> {
     let refuse = |error: io::Error| {
-        ImagingError::refused(format!("it cannot be written: {error}"))
+        ImagingError::refused(format!("cannot be written: {error}"))
             .at(folder.display().to_string())
     };
     let parent = match folder.parent() {
@@ -81,8 +80,7 @@ fn check_replaceable(folder: &Path) -> Result<(), ImagingError> {
         return Ok(());
     }
     let entries = std::fs::read_dir(folder).map_err(|error| {
-        ImagingError::refused(format!("the folder for the series cannot be used: {error}"))
-            .at(place())
+        ImagingError::refused(format!("cannot use the folder for the series: {error}")).at(place())
     })?;
     for entry in entries.flatten() {
         let path = entry.path();
@@ -92,7 +90,7 @@ fn check_replaceable(folder: &Path) -> Result<(), ImagingError> {
                 .is_some_and(|name| name.to_string_lossy().starts_with("IM"));
         if !is_ours {
             let message = format!(
-                "it holds `{}`, which is no image of a series",
+                "it contains `{}`, which is not an image of a series",
                 entry.file_name().display()
             );
             return Err(ImagingError::refused(message)
@@ -256,10 +254,10 @@ impl<'v> Image<'v> {
         let start = self.volume.grid.offset([0, 0, slice]);
         let values = &self.volume.hu[start..start + columns * rows];
         let mut bytes = Vec::with_capacity(2 * values.len());
+        let circle = ImageCircle::new([columns, rows]);
         for (j, row) in values.chunks_exact(columns).enumerate() {
             for (i, hu) in row.iter().enumerate() {
-                let is_padding =
-                    self.series.has_padding && is_outside_circle([columns, rows], [i, j]);
+                let is_padding = self.series.has_padding && circle.share(i, j) > 1.0;
                 let stored = if is_padding {
                     PADDING
                 } else {

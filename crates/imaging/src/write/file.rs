@@ -16,7 +16,7 @@ pub(super) fn write_whole(
 ) -> Result<(), ImagingError> {
     stream(path, write).map_err(|error| match error.kind() {
         io::ErrorKind::Interrupted => ImagingError::Interrupted,
-        _ => ImagingError::refused(format!("it cannot be written: {error}"))
+        _ => ImagingError::refused(format!("cannot be written: {error}"))
             .at(path.display().to_string()),
     })
 }

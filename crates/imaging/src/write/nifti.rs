@@ -109,7 +109,7 @@ fn header(
     for (axis, size) in grid.size().into_iter().enumerate() {
         let size = i16::try_from(size).map_err(|_| {
             ImagingError::refused(format!(
-                "{size} voxels along one axis; NIfTI-1 has room for 32767"
+                "{size} voxels along one axis; NIfTI-1 allows 32767"
             ))
             .at(path.display().to_string())
         })?;

@@ -2,4 +2,3 @@
 
 mod readers;
 mod reconstruct;
-mod synth;

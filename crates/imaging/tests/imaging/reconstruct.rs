@@ -184,7 +184,7 @@ fn chest_is_taken_apart_into_closed_surfaces_of_the_right_size() {
     }
     // The bed is no part of the body, the nodule one of the lung.
     assert!(
-        remarks(&made).contains("touches something else"),
+        remarks(&made).contains("in contact with another object"),
         "{}",
         remarks(&made)
     );
@@ -275,7 +275,7 @@ fn one_lung_and_none_are_said() {
     let mut solids = body_and_bed();
     let made = run(&render(&solids, grid()), &options()).unwrap();
     assert!(made.segmentation.lungs.lungs.is_empty());
-    assert!(remarks(&made).contains("no lungs were found"));
+    assert!(remarks(&made).contains("no lungs found"));
     solids.push(left_lung());
     let made = run(&render(&solids, grid()), &options()).unwrap();
     assert!(matches!(
@@ -285,7 +285,7 @@ fn one_lung_and_none_are_said() {
             ..
         }]
     ));
-    assert!(remarks(&made).contains("one lung was found, at the patient's left side"));
+    assert!(remarks(&made).contains("one lung found, on the patient's left side"));
 }
 
 #[test]
@@ -362,7 +362,7 @@ fn seeds_that_are_in_no_lesion_are_refused_by_name() {
         ([0.0, 0.0, 900.0], "outside the volume"),
         ([170.0, 0.0, 0.0], "outside the body"),
         ([72.0, 0.0, 0.0], "in air"),
-        ([0.0, 0.0, 0.0], "cannot be told from"),
+        ([0.0, 0.0, 0.0], "cannot be separated from"),
         ([f64::NAN, 0.0, 0.0], "outside the volume"),
     ] {
         let mut options = options();

@@ -11,7 +11,7 @@ mod renderer;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Rotation3, Unit, Vector3};
-use needlebench_kinematics::random::NormalPairs;
+use needlebench_numerics::random::NormalPairs;
 use renderer::{Scanner, Scene, ball_on_skin};
 
 use super::*;
@@ -302,7 +302,7 @@ fn a_ball_within_one_slice_has_no_place_across_it() {
         marker
             .remarks
             .iter()
-            .any(|r| r.message.contains("not to be had"))
+            .any(|r| r.message.contains("too uncertain"))
     );
 }
 

@@ -1,7 +1,7 @@
 //! Scans of made-up markers, by counting points: nothing of the fit's model is in here.
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use needlebench_kinematics::random::NormalPairs;
+use needlebench_numerics::random::NormalPairs;
 
 use crate::{Volume, VoxelGrid};
 

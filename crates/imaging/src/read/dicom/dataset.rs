@@ -194,7 +194,7 @@ struct Head {
 }
 
 fn no_number(tag: Tag) -> ImagingError {
-    ImagingError::refused("holds what is no number")
+    ImagingError::refused("is not a number")
         .at(tag::written(tag))
         .hint("correct the element, e.g. with dcmodify (DCMTK), or export the series again")
 }
@@ -247,12 +247,12 @@ impl<R: Read + Seek> Elements<R> {
         while self.pixels.is_none() && self.end - self.at >= 8 {
             let head = self.head()?;
             if matches!(head.tag, tag::END_OF_ITEM | tag::END_OF_SEQUENCE) {
-                return Err(damaged("an item ends that did not begin", self.at));
+                return Err(damaged("an item delimiter without an item", self.at));
             }
             self.value(&head, self.end, &mut found, 0)?;
         }
         if self.pixels.is_none() && self.at < self.end {
-            return Err(damaged("the file is cut off", self.at));
+            return Err(damaged("the file is truncated", self.at));
         }
         Ok((found, self.pixels))
     }
@@ -273,7 +273,7 @@ impl<R: Read + Seek> Elements<R> {
     fn fill(&mut self, bytes: &mut [u8]) -> Result<(), ImagingError> {
         self.input
             .read_exact(bytes)
-            .map_err(|_| damaged("the file is cut off", self.at))?;
+            .map_err(|_| damaged("the file is truncated", self.at))?;
         self.at += bytes.len() as u64;
         Ok(())
     }
@@ -418,7 +418,7 @@ impl<R: Read + Seek> Elements<R> {
         is_wanted: bool,
     ) -> Result<Vec<DataSet>, ImagingError> {
         if depth > DEPTH {
-            return Err(damaged("sequences within sequences without end", self.at));
+            return Err(damaged("sequences are nested too deeply", self.at));
         }
         let mut items = Vec::new();
         let last = stop.unwrap_or(end);
@@ -429,7 +429,7 @@ impl<R: Read + Seek> Elements<R> {
                 tag::ITEM => {}
                 other => {
                     return Err(damaged(
-                        format!("element {} where an item is due", tag::written(other)),
+                        format!("element {} where an item is expected", tag::written(other)),
                         self.at,
                     ));
                 }
@@ -448,7 +448,7 @@ impl<R: Read + Seek> Elements<R> {
 
     fn head_within(&mut self, end: u64) -> Result<Head, ImagingError> {
         if end.saturating_sub(self.at) < 8 {
-            return Err(damaged("a sequence does not end", self.at));
+            return Err(damaged("a sequence has no end", self.at));
         }
         self.head()
     }
@@ -457,7 +457,7 @@ impl<R: Read + Seek> Elements<R> {
         let is_undefined = length == UNDEFINED;
         if !is_undefined && length > end.saturating_sub(self.at) {
             return Err(damaged(
-                format!("an item of {length} bytes is longer than what it lies in"),
+                format!("an item of {length} bytes is longer than its sequence"),
                 self.at,
             ));
         }
@@ -495,7 +495,7 @@ impl<R: Read + Seek> Elements<R> {
             let left = self.end - self.at;
             if head.tag != tag::ITEM || head.length == UNDEFINED || head.length > left {
                 return Err(damaged(
-                    "the compressed pixels are cut off or no items",
+                    "the compressed pixels are truncated or not items",
                     self.at,
                 ));
             }
@@ -592,6 +592,9 @@ mod tests {
             bytes.extend([0xFE, 0xFF, 0x00, 0xE0, 0xFF, 0xFF, 0xFF, 0xFF]);
         }
         let problem = read(&bytes, Encoding::EXPLICIT).unwrap_err();
-        assert!(problem.to_string().contains("without end"), "{problem}");
+        assert!(
+            problem.to_string().contains("nested too deeply"),
+            "{problem}"
+        );
     }
 }

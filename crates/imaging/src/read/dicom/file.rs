@@ -98,9 +98,7 @@ impl OpenedFile {
         let syntax = if let Some(uid) = meta.text(tag::TRANSFER_SYNTAX) {
             TransferSyntax::of(&uid)
         } else {
-            assumed = Some(
-                "the file does not say how it is written (no transfer syntax): read as its first bytes suggest",
-            );
+            assumed = Some("the file states no transfer syntax: determined from its first bytes");
             TransferSyntax::plain(guessed(&head))
         };
         if syntax.is_deflated() {
@@ -120,13 +118,13 @@ impl OpenedFile {
         match (encoding, guessed(&head)) {
             (Encoding::EXPLICIT, Encoding::IMPLICIT) => {
                 assumed = Some(
-                    "the file says that its elements have VRs, but they have none: read without",
+                    "the file states explicit VRs, but its elements have none: read as implicit",
                 );
                 encoding = Encoding::IMPLICIT;
             }
             (Encoding::IMPLICIT, Encoding::EXPLICIT) => {
                 assumed = Some(
-                    "the file says that its elements have no VRs, but they have: read with them",
+                    "the file states implicit VRs, but its elements have them: read as explicit",
                 );
                 encoding = Encoding::EXPLICIT;
             }
@@ -194,7 +192,7 @@ fn inflated(
     }
     if bytes.len() as u64 > most_bytes {
         return Err(ImagingError::refused(format!(
-            "the deflated data set is longer than the limit of {}",
+            "the deflated data set is larger than the limit of {}",
             syntax::in_mib(most_bytes)
         ))
         .hint("raise the limit with --max-memory"));

@@ -43,7 +43,7 @@ pub(super) struct ImageFile {
     pub(super) is_lossy: bool,
     /// Whether the compression leaves it open, and the file says nothing.
     pub(super) may_be_lossy: bool,
-    /// Text of (0018,1120): for information only, its sign differs between makers.
+    /// Text of (0018,1120): for information only, its sign differs between manufacturers.
     pub(super) gantry_tilt: Option<f64>,
     pub(super) segmentation: Option<Segmentation>,
     bits_allocated: i64,
@@ -151,7 +151,7 @@ pub(super) fn slices(
         let sop_class = data.text(tag::SOP_CLASS).or(sop_class).unwrap_or_default();
         if CT_IMAGES.contains(&sop_class.as_str()) {
             return Err(ImagingError::refused(
-                "the file is cut off: it is a CT image without pixels",
+                "the file is truncated: it is a CT image without pixels",
             )
             .at(name)
             .hint("copy or export it again"));
@@ -171,13 +171,13 @@ pub(super) fn slices(
         .ok()
         .filter(|_| (1..=FRAMES).contains(&stated))
         .ok_or_else(|| {
-            ImagingError::refused(format!("it says that it has {stated} frames"))
+            ImagingError::refused(format!("it states {stated} frames"))
                 .at(name)
                 .hint("copy or export it again")
         })?;
     if frames > 1 && !of_frames.is_empty() && of_frames.len() != frames {
         return Err(ImagingError::refused(format!(
-            "it says that it has {frames} frames, but describes {}",
+            "it states {frames} frames, but describes {}",
             of_frames.len()
         ))
         .at(name)
@@ -275,7 +275,7 @@ fn check_frames(
     // A single one says by itself what is missing.
     if frames > 1 && frames as u64 > most {
         return Err(ImagingError::refused(format!(
-            "the file is cut off: it says that it has {frames} frames, but has pixels of {most}"
+            "the file is truncated: it states {frames} frames, but has pixels of {most}"
         ))
         .hint("copy or export it again"));
     }
@@ -309,11 +309,9 @@ fn positive(layers: &Layers, tag: Tag) -> Option<f64> {
 
 fn plane(layers: &Layers) -> Result<Plane, ImagingError> {
     let missing = |what: &str, tag| {
-        ImagingError::refused(format!(
-            "there is no {what}: where the slice lies is not known"
-        ))
-        .at(tag::written(tag))
-        .hint("export the original images of the scanner, not secondary captures")
+        ImagingError::refused(format!("there is no {what}: the slice position is unknown"))
+            .at(tag::written(tag))
+            .hint("export the original images of the scanner, not secondary captures")
     };
     let position = layers
         .array::<3>(tag::POSITION)?
@@ -330,7 +328,7 @@ fn plane(layers: &Layers) -> Result<Plane, ImagingError> {
         && along_row.dot(&down_column).abs() < COSINES;
     if !is_frame {
         return Err(ImagingError::refused(format!(
-            "[{a}, {b}, {c}] and [{d}, {e}, {f}] are no two directions at right angles"
+            "[{a}, {b}, {c}] and [{d}, {e}, {f}] are not perpendicular directions"
         ))
         .at(tag::written(tag::ORIENTATION))
         .hint("export the series again"));
@@ -358,7 +356,8 @@ fn rescale(layers: &Layers) -> Result<Rescale, ImagingError> {
     let has_table = layers.first(|data| data.items(tag::MODALITY_LUT).first().map(|_| ()));
     if has_table.is_some() {
         return Err(ImagingError::refused(
-            "HU are given by a table (Modality LUT) instead of slope and intercept, which is not read",
+            "HU are given by a table (Modality LUT) instead of slope and intercept, which is not \
+             supported",
         )
         .at(tag::written(tag::MODALITY_LUT))
         .hint("export it as CT Image Storage with RescaleSlope and RescaleIntercept"));
@@ -367,9 +366,9 @@ fn rescale(layers: &Layers) -> Result<Rescale, ImagingError> {
     let intercept = layers.real(tag::INTERCEPT)?.unwrap_or(0.0);
     if slope == 0.0 {
         return Err(
-            ImagingError::refused("the slope is 0: all voxels would be the same")
+            ImagingError::refused("the slope is 0: all voxels would be equal")
                 .at(tag::written(tag::SLOPE))
-                .hint("export the series again; stored numbers are HU where the slope is left out"),
+                .hint("export the series again; stored values are HU if there is no slope"),
         );
     }
     Ok(Rescale { slope, intercept })
@@ -380,13 +379,13 @@ fn stored(data: &DataSet, syntax: &TransferSyntax) -> Result<Stored, ImagingErro
     let photometric = data.text(tag::PHOTOMETRIC).unwrap_or_default();
     if samples != 1 || !["MONOCHROME1", "MONOCHROME2", ""].contains(&photometric.as_str()) {
         return Err(ImagingError::refused(format!(
-            "the pixels are colours ({photometric}, {samples} samples each), and not numbers"
+            "the pixels are colours ({photometric}, {samples} samples each), not numbers"
         ))
         .at(tag::written(tag::PHOTOMETRIC))
-        .hint("leave screen shots and reports out of the folder"));
+        .hint("remove screenshots and reports from the folder"));
     }
     let missing = |tag| {
-        ImagingError::refused("how the pixels are stored is not said")
+        ImagingError::refused("the pixel format is not stated")
             .at(tag::written(tag))
             .hint("export the series again")
     };
@@ -405,11 +404,11 @@ fn stored(data: &DataSet, syntax: &TransferSyntax) -> Result<Stored, ImagingErro
         (32, false) => Kind::U32,
         (32, true) => Kind::I32,
         _ => {
-            return Err(
-                ImagingError::refused(format!("pixels of {allocated} bits are not read"))
-                    .at(tag::written(tag::BITS_ALLOCATED))
-                    .hint("convert them to 16 bits with gdcmconv --raw IN OUT (GDCM)"),
-            );
+            return Err(ImagingError::refused(format!(
+                "pixels of {allocated} bits are not supported"
+            ))
+            .at(tag::written(tag::BITS_ALLOCATED))
+            .hint("convert them to 16 bits with gdcmconv --raw IN OUT (GDCM)"));
         }
     };
     if bits < 1 || bits > allocated || high >= allocated || high + 1 < bits {

@@ -72,7 +72,7 @@ pub(super) fn read(
             problem
         ))
         .at(place_of(problem))
-        .hint("copy or export it again, or take it out of the folder"));
+        .hint("copy or export it again, or remove it from the folder"));
     }
     let label = series.label.clone();
     let stack = stack::stack(series.slices, options.fill_gaps)?;
@@ -108,7 +108,7 @@ pub(super) fn read(
 
 fn without_images(path: &Path, files: usize) -> ImagingError {
     let what = match (path.is_dir(), files) {
-        (false, _) => "it is DICOM, but no image".to_owned(),
+        (false, _) => "it is DICOM, but not an image".to_owned(),
         (true, 0) => "the folder is empty".to_owned(),
         (true, files) => format!("none of its {files} files is a DICOM image"),
     };
@@ -200,25 +200,24 @@ fn header_remarks(stack: &Stack) -> Vec<Remark> {
     }
     if let Some((slice, count)) = first_with(&|slice| !slice.has_rescale) {
         let message = format!(
-            "{count} slices have no slope and intercept: their stored numbers are taken as HU"
+            "{count} slices have no slope and intercept: their stored values are used as HU"
         );
         remarks.push(Remark::new(message).at(&*slice.file.name));
     }
     if let Some((slice, _)) = first_with(&|slice| slice.rescale_type.is_some()) {
         let kind = slice.rescale_type.as_deref().unwrap_or_default();
-        remarks.push(
-            Remark::new(format!("the unit is said to be {kind}, and not HU")).at(&*slice.file.name),
-        );
+        remarks
+            .push(Remark::new(format!("the stated unit is {kind}, not HU")).at(&*slice.file.name));
     }
     if let Some((slice, count)) = first_with(&|slice| slice.file.is_lossy) {
-        let message = format!(
-            "{count} slices were compressed with loss: HU are no longer those that were measured"
-        );
+        let message =
+            format!("{count} slices were compressed with loss: HU differ from the measured ones");
         remarks.push(Remark::new(message).at(&*slice.file.name));
     }
     if let Some((slice, count)) = first_with(&|slice| slice.file.may_be_lossy) {
         let message = format!(
-            "{count} slices may have been compressed with loss: their compression can, and the file does not say"
+            "{count} slices may have been compressed with loss: their compression allows it, and \
+             the file does not state it"
         );
         remarks.push(Remark::new(message).at(&*slice.file.name));
     }
@@ -228,7 +227,8 @@ fn header_remarks(stack: &Stack) -> Vec<Remark> {
         let [least, _] = slice.file.padding.unwrap_or_default();
         remarks.push(
             Remark::new(format!(
-                "padding is said to be stored as {least}, which may be tissue by slope and intercept: not applied"
+                "the stated padding value {least} may be tissue by slope and intercept: not \
+                 applied"
             ))
             .at(&*slice.file.name),
         );
@@ -260,12 +260,12 @@ fn tilt(stack: &Stack) -> Option<Remark> {
     let differs = (by_positions_deg - stated_deg).abs() > TILT_DEG && stack.slices.len() > 1;
     if by_positions_deg > TILT_DEG {
         let by_header = if differs {
-            format!("; the header says {stated_deg} deg, which does not count")
+            format!("; the header states {stated_deg} deg, which is ignored")
         } else {
             String::new()
         };
         return Some(Remark::new(format!(
-            "the gantry was tilted: slices lean by {by_positions_deg:.2} deg by their positions{by_header}"
+            "tilted gantry: {by_positions_deg:.2} deg by the slice positions{by_header}"
         )));
     }
     None

@@ -46,13 +46,13 @@ fn check_frame(slice: &Slice, stored: &Stored) -> Result<(), ImagingError> {
     let wanted = frame_bytes(image, stored);
     match &image.pixels {
         None => Err(
-            ImagingError::refused("it has no pixels, or they are floats")
+            ImagingError::refused("it has no pixels, or they are floating-point")
                 .hint("copy or export it again"),
         ),
         Some(Pixels::Plain { bytes, .. }) => {
             if !image.syntax.is_plain() {
                 return Err(ImagingError::refused(format!(
-                    "the file says that its pixels are compressed by {}, but they are not",
+                    "the file states pixels compressed by {}, but they are not compressed",
                     image.syntax.name()
                 ))
                 .hint("copy or export it again"));
@@ -60,7 +60,7 @@ fn check_frame(slice: &Slice, stored: &Stored) -> Result<(), ImagingError> {
             let all = wanted * (slice.frame as u64 + 1);
             if *bytes < all {
                 return Err(ImagingError::refused(format!(
-                    "the file is cut off: {bytes} bytes of pixels, where {} x {} x {} take {all}",
+                    "the file is truncated: {bytes} bytes of pixels, but {} x {} x {} need {all}",
                     image.columns,
                     image.rows,
                     slice.frame + 1
@@ -74,7 +74,7 @@ fn check_frame(slice: &Slice, stored: &Stored) -> Result<(), ImagingError> {
             let bytes: u64 = pieces.iter().map(|(_, bytes)| bytes).sum();
             if wanted > SMALL && wanted > bytes * MOST_INFLATION {
                 return Err(ImagingError::refused(format!(
-                    "{bytes} compressed bytes cannot be {} x {} pixels",
+                    "{bytes} compressed bytes are not {} x {} pixels",
                     image.columns, image.rows
                 ))
                 .hint("copy or export it again"));
@@ -97,7 +97,7 @@ fn pieces(image: &ImageFile, frame: usize) -> Result<&[(u64, u64)], ImagingError
     }
     let unknown = || {
         ImagingError::refused(format!(
-            "{} compressed pieces for {} frames, and no table of where frames begin",
+            "{} compressed fragments for {} frames, without an offset table",
             pieces.len(),
             image.frames
         ))
@@ -218,13 +218,13 @@ pub(super) fn bits(
     let image = &*slice.file;
     let wrong = |what: &str| named(ImagingError::refused(what), &image.name);
     let Some(Pixels::Plain { offset, bytes }) = &image.pixels else {
-        return Err(wrong("compressed single bits are not read"));
+        return Err(wrong("compressed single-bit pixels are not supported"));
     };
     let count = u64::from(image.rows) * u64::from(image.columns);
     let first = count * slice.frame as u64;
     let (start, end) = (first / 8, (first + count).div_ceil(8));
     if end > *bytes {
-        return Err(wrong("the file is cut off: pixels are missing"));
+        return Err(wrong("the file is truncated: pixels are missing"));
     }
     buffer.clear();
     last.append(image, options, offset + start, end - start, buffer)

@@ -33,7 +33,7 @@ pub(in crate::read) fn read(
         .and_then(|slice| slice.file.segmentation.as_ref())
     else {
         return Err(
-            ImagingError::refused("it is no segmentation: there is no SegmentationType")
+            ImagingError::refused("not a segmentation: there is no SegmentationType")
                 .at("(0062,0001)")
                 .hint("a label map is read from DICOM SEG or NIfTI"),
         );
@@ -76,7 +76,7 @@ pub(in crate::read) fn read(
     }
     if overlapping > 0 {
         remarks.push(Remark::new(format!(
-            "{overlapping} voxels are in several segments: the last one counts"
+            "{overlapping} voxels are in several segments: the last one is used"
         )));
     }
     let mut names = segmentation.segments.clone();
@@ -107,18 +107,19 @@ fn threshold(
             let threshold = f64::from(segmentation.greatest_fraction) * HALF;
             remarks.push(
                 Remark::new(format!(
-                    "the segmentation has fractions: voxels of {threshold} and more of {} belong to a segment",
+                    "the segmentation is fractional: voxels of at least {threshold} of {} belong \
+                     to a segment",
                     segmentation.greatest_fraction
                 ))
                 .at("(0062,0001)"),
             );
             Ok(Some(threshold))
         }
-        other => Err(
-            ImagingError::refused(format!("segmentations of type {other} are not read"))
-                .at("(0062,0001)")
-                .hint("export it as BINARY, FRACTIONAL or LABELMAP, or as NIfTI"),
-        ),
+        other => Err(ImagingError::refused(format!(
+            "segmentations of type {other} are not supported"
+        ))
+        .at("(0062,0001)")
+        .hint("export it as BINARY, FRACTIONAL or LABELMAP, or as NIfTI")),
     }
 }
 
@@ -128,7 +129,7 @@ fn number_of(slice: &Slice, segmentation: &Segmentation) -> Result<u16, ImagingE
         (Some(number), _) if number > 0 => Ok(number),
         (None, [(only, _)]) => Ok(*only),
         _ => Err(
-            ImagingError::refused("which segment the frame shows is not said")
+            ImagingError::refused("the segment of the frame is not stated")
                 .at(format!("{}, (0062,000B)", shown(slice))),
         ),
     }
@@ -187,9 +188,14 @@ impl<'a> Placing<'a> {
             });
             if apart_m > SAME_PLACE_M || !is_inside {
                 return Err(ImagingError::refused(format!(
-                    "a corner of the segmentation is {:.3} mm from the CT's nearest voxel{}: it is of another volume",
+                    "a corner of the segmentation is {:.3} mm from the CT's nearest voxel{}: it \
+                     belongs to another volume",
                     apart_m * 1e3,
-                    if is_inside { "" } else { ", and outside the CT" }
+                    if is_inside {
+                        ""
+                    } else {
+                        ", and outside the CT"
+                    }
                 ))
                 .hint("export the segmentation in the geometry of the CT"));
             }

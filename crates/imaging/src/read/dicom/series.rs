@@ -207,7 +207,7 @@ impl Series {
         if key.is_scout {
             words.push("a scout".to_owned());
         } else if self.slices[0].plane.is_err() {
-            words.push("without a place".to_owned());
+            words.push("without a position".to_owned());
         }
         format!("{}: {}", self.label, words.join(", "))
     }
@@ -218,7 +218,7 @@ impl Series {
             return Vec::new();
         }
         vec![Remark::new(format!(
-            "{} of the files are there twice: one of each was read",
+            "{} files are duplicates: one of each was read",
             self.copies
         ))]
     }
@@ -258,26 +258,26 @@ pub(super) fn choose(
     let mut remarks = chosen.remarks();
     if !all.is_empty() && wanted.is_none() {
         remarks.push(Remark::new(format!(
-            "series {} is the only volume; left out: {}",
+            "series {} is the only volume; ignored: {}",
             chosen.label,
             list(&all)
         )));
     }
     if chosen.key().is_scout {
         return Err(
-            ImagingError::refused("it is a scout (LOCALIZER), and no volume")
+            ImagingError::refused("it is a scout (LOCALIZER), not a volume")
                 .at(format!("series {}", chosen.label))
                 .hint("name the folder or file of the scan"),
         );
     }
     match &chosen.key().modality {
         Some(modality) if modality != "CT" => Err(ImagingError::refused(format!(
-            "the modality is {modality}, and not CT"
+            "the modality is {modality}, not CT"
         ))
         .at(format!("series {}", chosen.label))
         .hint("name the folder or file of a CT")),
         None => {
-            remarks.push(Remark::new("the modality is not said: taken as CT"));
+            remarks.push(Remark::new("the modality is not stated: CT assumed"));
             Ok((chosen, remarks))
         }
         Some(_) => Ok((chosen, remarks)),
@@ -307,15 +307,14 @@ fn only_volume(all: &[Series]) -> Result<usize, ImagingError> {
         ([at], _, _) | ([], [at], _) => Ok(*at),
         // What is wrong with the only one says itself when it is read.
         ([], [], [_]) => Ok(0),
-        ([], [], _) => Err(ImagingError::refused("no series is a volume of CT")
+        ([], [], _) => Err(ImagingError::refused("no series is a CT volume")
             .hint(format!("the series are {}", list(all)))),
         _ => {
             let several = if stacks.is_empty() { &volumes } else { &stacks };
-            Err(ImagingError::refused(format!(
-                "there are {} series that may be meant",
-                several.len()
-            ))
-            .hint(format!("choose one with --series: {}", list(all))))
+            Err(
+                ImagingError::refused(format!("{} series are possible", several.len()))
+                    .hint(format!("choose one with --series: {}", list(all))),
+            )
         }
     }
 }

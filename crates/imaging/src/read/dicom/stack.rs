@@ -184,10 +184,10 @@ fn grid(plane: &Plane, step_mm: Vector3<f64>, size: [usize; 3]) -> Result<VoxelG
 
 fn same_place(a: &Slice, b: &Slice, height_mm: f64) -> ImagingError {
     ImagingError::refused(format!(
-        "two slices are at the same place, {height_mm:.3} mm along the normal of the slices"
+        "two slices are at the same position, {height_mm:.3} mm along the slice normal"
     ))
     .at(format!("{}, {}", shown(a), shown(b)))
-    .hint("take one of the two out of the folder")
+    .hint("remove one of the two from the folder")
 }
 
 /// A slice, for people.
@@ -199,7 +199,7 @@ fn shown(slice: &Slice) -> String {
     }
 }
 
-/// Distance that stands for one that nobody said: of a single slice, where it matters to nothing within the slice.
+/// Slice spacing assumed for a single slice of unknown thickness, where it does not affect anything in the slice.
 const ASSUMED_MM: f64 = 1.0;
 
 fn single(slices: Vec<Slice>, plane: &Plane, normal: &Vector3<f64>) -> Result<Stack, ImagingError> {
@@ -210,11 +210,10 @@ fn single(slices: Vec<Slice>, plane: &Plane, normal: &Vector3<f64>) -> Result<St
         1,
     ];
     let message = match slice.thickness_mm {
-        Some(mm) => format!(
-            "there is one slice; its thickness, {mm} mm, stands for the distance between slices"
-        ),
+        Some(mm) => format!("there is one slice; its thickness, {mm} mm, is used as slice spacing"),
         None => format!(
-            "there is one slice, and how thick it is is not said: {ASSUMED_MM} mm stand for the distance between slices"
+            "there is one slice of unknown thickness: a slice spacing of {ASSUMED_MM} mm is \
+             assumed"
         ),
     };
     let step_mm = slice.thickness_mm.unwrap_or(ASSUMED_MM);
@@ -236,10 +235,10 @@ fn check_line(slices: &[Slice], heights: &[f64], along: &Vector3<f64>) -> Result
             .map_or(0.0, |plane| (plane.position_mm - expected).norm());
         if aside_mm > ASIDE_MM {
             return Err(ImagingError::refused(format!(
-                "the slice lies {aside_mm:.2} mm beside the line along which the others are stacked"
+                "the slice is {aside_mm:.2} mm off the line of the others"
             ))
             .at(shown(slice))
-            .hint("slices of two scans may be mixed: take those of one"));
+            .hint("slices of two scans may be mixed: use those of one"));
         }
     }
     Ok(())
@@ -290,8 +289,8 @@ fn steps(
     }
     if apart_mm <= ROUNDED_MM.min(ROUNDED_SHARE * step_mm) {
         remarks.push(Remark::new(format!(
-            "positions of slices are up to {apart_mm:.3} mm beside even steps of {step_mm:.4} mm, as rounding leaves \
-             them: even steps count"
+            "slice positions deviate by up to {apart_mm:.3} mm from a uniform spacing of \
+             {step_mm:.4} mm (rounding): the uniform spacing is used"
         )));
         return Ok(Steps { step_mm, sources });
     }
@@ -351,11 +350,16 @@ fn resampled(
 ) -> Result<Steps, ImagingError> {
     if let Some(at) = gaps.iter().position(|gap| *gap > HOLE * usual_mm) {
         return Err(ImagingError::refused(format!(
-            "there is nothing between {:.2} and {:.2} mm, where slices are {usual_mm:.3} mm apart elsewhere",
+            "there is no slice between {:.2} and {:.2} mm, but the slice spacing is {usual_mm:.3} \
+             mm elsewhere",
             heights[at],
             heights[at + 1]
         ))
-        .at(format!("{} and {}", shown(&slices[at]), shown(&slices[at + 1])))
+        .at(format!(
+            "{} and {}",
+            shown(&slices[at]),
+            shown(&slices[at + 1])
+        ))
         .hint("export the series again"));
     }
     let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
@@ -379,7 +383,8 @@ fn resampled(
         });
     }
     remarks.push(Remark::new(format!(
-        "slices are {least:.3} to {greatest:.3} mm apart: interpolated to even steps of {step_mm:.3} mm"
+        "slice spacing of {least:.3} to {greatest:.3} mm: interpolated to a uniform {step_mm:.3} \
+         mm"
     )));
     Ok(Steps { step_mm, sources })
 }

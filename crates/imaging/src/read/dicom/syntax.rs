@@ -122,7 +122,7 @@ impl TransferSyntax {
             "decompress it with gdcmconv --raw IN OUT (GDCM), or dcmconv or dcmdjpeg (DCMTK)"
         };
         Err(ImagingError::refused(format!(
-            "the pixels are compressed by {}, which is not read",
+            "the pixels are compressed by {}, which is not supported",
             self.name()
         ))
         .hint(hint))
@@ -144,10 +144,10 @@ impl TransferSyntax {
         // Decoders take memory for what a stream says of itself: it has to be what the file says of it.
         let stated = self
             .stated(frame.bytes)
-            .ok_or_else(|| wrong("they do not begin as they should"))?;
+            .ok_or_else(|| wrong("they have an invalid beginning"))?;
         if (stated.columns, stated.rows) != (frame.columns.into(), frame.rows.into()) {
             return Err(wrong(&format!(
-                "they are {} x {}, the file says {} x {}",
+                "they are {} x {}, the file states {} x {}",
                 stated.columns, stated.rows, frame.columns, frame.rows
             )));
         }
@@ -163,7 +163,7 @@ impl TransferSyntax {
         }
         if !stated.has_width(frame.bits_allocated) {
             return Err(wrong(&format!(
-                "they have {} bits, the file says {} for each",
+                "they have {} bits, the file states {} for each",
                 stated.bits, frame.bits_allocated
             )));
         }
@@ -182,7 +182,7 @@ impl TransferSyntax {
         match caught(|| decoder.decode_frame(&object, 0, &mut decoded)) {
             Some(Ok(())) => {}
             Some(Err(error)) => return Err(wrong(&with_sources(&error))),
-            None => return Err(wrong("the decoder gave up")),
+            None => return Err(wrong("the decoder failed")),
         }
         if decoded.len() != expected {
             return Err(wrong(&format!(

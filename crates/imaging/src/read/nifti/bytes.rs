@@ -89,7 +89,7 @@ impl ByteStream {
             let first = reader.fill_buf().map_err(unreadable)?;
             if !super::version::begins_as_header(first) {
                 return Err(ImagingError::refused(
-                    "it is called .gz, but its first bytes are not those of gzip",
+                    "it is named .gz, but its first bytes are not those of gzip",
                 )
                 .at(name)
                 .hint("copy or export it again"));
@@ -173,7 +173,7 @@ impl ByteStream {
         } else if first.iter().any(|byte| *byte != 0) {
             // Zeros are the padding of tapes and blocks.
             self.source = Source::End(Some(
-                "what follows the compressed data is no gzip and is left unread",
+                "data after the compressed data are not gzip and are ignored",
             ));
         }
         Ok(())
@@ -197,7 +197,7 @@ impl ByteStream {
         piece: &mut [u8],
     ) -> Result<Option<&'static str>, ImagingError> {
         if self.fill(piece)? > 0 {
-            return Ok(Some("what follows the last voxel is left unread"));
+            return Ok(Some("data after the last voxel are ignored"));
         }
         Ok(match self.source {
             Source::End(odd) => odd,

@@ -32,7 +32,7 @@ impl Header {
         let mut length = stream.fill(&mut bytes[..BYTES_1])?;
         let Some((version, is_big_endian)) = version_of(&bytes[..length]) else {
             return Err(ImagingError::refused(
-                "it is no NIfTI file: it does not begin with the size of a header, 348 or 540",
+                "not a NIfTI file: it does not begin with the header size, 348 or 540",
             )
             .hint("a CT is read from .nii, .nii.gz, .hdr with .img, or DICOM"));
         };
@@ -42,7 +42,8 @@ impl Header {
         let wanted = if version == 1 { BYTES_1 } else { BYTES_2 };
         if length < wanted {
             return Err(ImagingError::refused(format!(
-                "the file is cut off: it ends after {length} of the {wanted} bytes of its header"
+                "the file is truncated: it ends after {length} of the {wanted} bytes of its \
+                 header"
             ))
             .hint("copy or export it again"));
         }
@@ -97,10 +98,11 @@ fn is_pair(fields: &Fields, version: u8) -> Result<bool, ImagingError> {
         Ok(false)
     } else {
         Err(ImagingError::refused(
-            "it has the header of ANALYZE 7.5, which does not say what is left and right, or a damaged one of NIfTI",
+            "it has an ANALYZE 7.5 header, which does not state left and right, or a damaged NIfTI \
+             header",
         )
         .at("magic")
-        .hint("convert it to NIfTI with a program that knows how the patient lies"))
+        .hint("convert it to NIfTI with a program that knows its orientation"))
     }
 }
 
@@ -114,11 +116,11 @@ fn size(fields: &Fields, is_first: bool) -> Result<[usize; 3], ImagingError> {
     };
     let count = dimension(0);
     if !(1..=7).contains(&count) {
-        return Err(ImagingError::refused(format!(
-            "it has {count} dimensions, where 1 to 7 are possible"
-        ))
-        .at("dim[0]")
-        .hint(DAMAGED));
+        return Err(
+            ImagingError::refused(format!("it has {count} dimensions, 1 to 7 allowed"))
+                .at("dim[0]")
+                .hint(DAMAGED),
+        );
     }
     let mut size = [1; 3];
     for (index, place) in (1..).zip(&mut size) {
@@ -144,11 +146,13 @@ fn size(fields: &Fields, is_first: bool) -> Result<[usize; 3], ImagingError> {
             } else {
                 "values a voxel"
             };
-            return Err(ImagingError::refused(format!(
-                "it holds {length} {of}, where a CT has one"
-            ))
-            .at(format!("dim[{index}]"))
-            .hint("write the one that is wanted to a file of its own, e.g. with nibabel's four_to_three"));
+            return Err(
+                ImagingError::refused(format!("it has {length} {of}, a CT has one"))
+                    .at(format!("dim[{index}]"))
+                    .hint(
+                        "write the required one to its own file, e.g. with nibabel's four_to_three",
+                    ),
+            );
         }
     }
     Ok(size)
@@ -163,7 +167,7 @@ fn kind(fields: &Fields, is_first: bool) -> Result<Kind, ImagingError> {
     let refused = |what: &str| {
         ImagingError::refused(format!("the voxels are {what} (code {code})"))
             .at("datatype")
-            .hint("write them as integers or floats, one number a voxel")
+            .hint("write them as integers or floats, one number per voxel")
     };
     let kind = match code {
         2 => Kind::U8,
@@ -176,16 +180,16 @@ fn kind(fields: &Fields, is_first: bool) -> Result<Kind, ImagingError> {
         768 => Kind::U32,
         1024 => Kind::I64,
         1280 => Kind::U64,
-        128 | 2304 => return Err(refused("colours, and not numbers")),
+        128 | 2304 => return Err(refused("colours, not numbers")),
         32 | 1792 | 2048 => return Err(refused("complex numbers")),
         1536 => return Err(refused("128-bit floats")),
         1 => return Err(refused("single bits")),
-        _ => return Err(refused("of a type that NIfTI does not have")),
+        _ => return Err(refused("of a type unknown in NIfTI")),
     };
     let expected = kind.bytes() * 8;
     if usize::try_from(bits) != Ok(expected) {
         return Err(ImagingError::refused(format!(
-            "it says {bits} bits, but {} numbers have {expected}",
+            "it states {bits} bits, but {} numbers have {expected}",
             kind.name()
         ))
         .at("bitpix")
@@ -208,7 +212,7 @@ fn rescale(fields: &Fields, is_first: bool) -> Result<Rescale, ImagingError> {
         return Err(
             ImagingError::refused(format!("the intercept is {intercept}"))
                 .at("scl_inter")
-                .hint("set it to 0 if the voxels are HU as they are stored"),
+                .hint("set it to 0 if the stored values are HU"),
         );
     }
     Ok(Rescale { slope, intercept })
@@ -228,7 +232,7 @@ fn data_offset(
     if given == 0.0 && least > 0 {
         remarks.push(
             Remark::new(format!(
-                "is 0; the voxels are taken to follow the header, from byte {least}"
+                "is 0; voxels assumed to follow the header, from byte {least}"
             ))
             .at("vox_offset"),
         );
@@ -237,7 +241,7 @@ fn data_offset(
     let is_sane = given >= least as f64 && given.fract() == 0.0 && given < 1e15;
     if !is_sane {
         return Err(ImagingError::refused(format!(
-            "the voxels begin at byte {given}, but the header needs the first {least}"
+            "the voxels begin at byte {given}, but the header takes the first {least}"
         ))
         .at("vox_offset")
         .hint(DAMAGED));

@@ -46,21 +46,19 @@ impl Nifti {
         let (header_path, data_path) = bytes::pair(path);
         let mut stream = opened(
             &header_path,
-            "the header belongs beside the voxels, in a file of the same name that ends in .hdr",
+            "the header must be next to the voxels, in a file of the same name ending in .hdr",
         )?;
         let header = Header::read(&mut stream, options)?;
         if header.is_pair && header_path == data_path {
             return Err(ImagingError::refused(
-                "it is the header of a pair of files (.hdr and .img), but is not called .hdr",
+                "it is the header of a file pair (.hdr and .img), but is not named .hdr",
             )
-            .hint(
-                "rename it to .hdr, with the voxels beside it in .img; or convert the pair to .nii",
-            ));
+            .hint("rename it to .hdr, with the voxels in .img; or convert the pair to .nii"));
         }
         let (stream, data_path) = if header.is_pair {
             let voxels = opened(
                 &data_path,
-                "the voxels belong beside the header, in a file of the same name that ends in .img",
+                "the voxels must be next to the header, in a file of the same name ending in .img",
             )?;
             (voxels, data_path)
         } else {
@@ -150,10 +148,10 @@ impl Nifti {
             match wrong {
                 None => Ok(()),
                 Some(value) => Err(ImagingError::refused(format!(
-                    "{value} is no label: labels are whole numbers from 0 to {}",
+                    "{value} is not a label: labels are whole numbers from 0 to {}",
                     u16::MAX
                 ))
-                .hint("is it the scan, or a map of probabilities, rather than a label map?")),
+                .hint("is it the scan or a probability map instead of a label map?")),
             }
         })?;
         Ok((labels, remarks))
@@ -168,7 +166,8 @@ impl Nifti {
             return Err(cut_off(
                 &self.data_path,
                 &format!(
-                    "the header asks for {wanted} bytes ({} x {} x {} voxels of {} bytes), but the file can hold at most {}",
+                    "the header requires {wanted} bytes ({} x {} x {} voxels of {} bytes), but the \
+                     file has at most {}",
                     size[0],
                     size[1],
                     size[2],
@@ -232,7 +231,7 @@ fn opened(path: &Path, hint: &str) -> Result<ByteStream, ImagingError> {
 
 fn cut_off(path: &Path, how: &str) -> ImagingError {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    ImagingError::refused(format!("the file is cut off: {how}"))
+    ImagingError::refused(format!("the file is truncated: {how}"))
         .at(name)
         .hint("copy or export it again")
 }

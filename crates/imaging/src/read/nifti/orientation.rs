@@ -137,21 +137,21 @@ impl Placement {
     fn unit_m(&self, remarks: &mut Vec<Remark>) -> f64 {
         match self.unit {
             1 => {
-                remarks.push(Remark::new("the header counts in metres").at("xyzt_units"));
+                remarks.push(Remark::new("the header uses metres").at("xyzt_units"));
                 1.0
             }
             2 => 1e-3,
             3 => {
-                remarks.push(Remark::new("the header counts in micrometres").at("xyzt_units"));
+                remarks.push(Remark::new("the header uses micrometres").at("xyzt_units"));
                 1e-6
             }
             unit => {
                 let what = if unit == 0 {
                     "no unit of length is given".to_owned()
                 } else {
-                    format!("{unit} is no unit of length")
+                    format!("{unit} is not a unit of length")
                 };
-                remarks.push(Remark::new(format!("{what}: taken as mm")).at("xyzt_units"));
+                remarks.push(Remark::new(format!("{what}: mm assumed")).at("xyzt_units"));
                 1e-3
             }
         }
@@ -206,7 +206,7 @@ pub(super) fn grid(
     let by_qform = has_qform.then(|| match placement.qform() {
         Some(form) => of_form(&form, "qform"),
         None => Err(
-            ImagingError::refused("the quaternion is longer than 1: no rotation has it")
+            ImagingError::refused("the quaternion has a norm above 1: not a rotation")
                 .at("qform")
                 .hint(AFFINE),
         ),
@@ -229,7 +229,7 @@ pub(super) fn grid(
     if has_sform && differs {
         remarks.push(
             Remark::new(format!(
-                "says {} mm between voxels, the sform {} mm: the sform counts",
+                "states a voxel spacing of {} mm, the sform {} mm: the sform is used",
                 in_mm(placement.spacing.map(|each| each.abs() * unit_m)),
                 in_mm(grid.spacing_m()),
             ))
@@ -251,14 +251,14 @@ fn compare(
 ) {
     let message = match by_qform {
         None => return,
-        Some(Err(_)) => "the qform is no placement: the sform counts".to_owned(),
+        Some(Err(_)) => "the qform is not a rigid transform: the sform is used".to_owned(),
         Some(Ok(by_qform)) => {
             let apart_m = by_sform.farthest_corners_m(&by_qform);
             if apart_m <= AGREEMENT_M {
                 return;
             }
             format!(
-                "sform and qform place a corner {:.3} mm apart: the sform counts",
+                "sform and qform differ by {:.3} mm at a corner: the sform is used",
                 apart_m * 1e3
             )
         }
@@ -276,17 +276,19 @@ fn without_forms(
 ) -> Result<VoxelGrid, ImagingError> {
     let Some(assumed) = &options.assume_orientation else {
         return Err(ImagingError::refused(
-            "neither sform nor qform: what is left and right of the patient is not known",
+            "neither sform nor qform: left and right of the patient are unknown",
         )
         .at("sform_code, qform_code")
         .hint(
-            "write the affine into the header; or, if you know how the voxels run, say it, e.g. --assume-orientation LPS: \
-             columns to the patient's left, rows to posterior, slices to the head",
+            "write the affine into the header; or, if you know the voxel axes, give them, e.g. \
+             --assume-orientation LPS: columns to the patient's left, rows to posterior, slices to \
+             superior",
         ));
     };
     remarks.push(
         Remark::new(format!(
-            "no orientation in the header: voxels are taken to run to {}, the volume's centre is the origin",
+            "no orientation in the header: voxel axes {} assumed, with the origin at the volume's \
+             centre",
             letters_of(assumed)
         ))
         .at("sform_code, qform_code"),
