@@ -11,10 +11,10 @@ use std::hint::black_box;
 use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use needlebench_cell::{Overrides, load_scenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_planning::{Member, Planner};
+use needlebench_scenario::{Overrides, load_scenario};
 
 fn atlas(c: &mut Criterion) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/supine_suite.toml");

@@ -6,9 +6,9 @@
 use std::path::Path;
 use std::time::Instant;
 
-use needlebench_cell::{Overrides, load_scenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_planning::{ClassLimits, ConfigurationPlan, Planner, SearchEnd};
+use needlebench_scenario::{Overrides, load_scenario};
 
 const SEEDS: u64 = 5;
 

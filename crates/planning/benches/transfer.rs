@@ -9,9 +9,9 @@
 use std::path::Path;
 use std::time::Instant;
 
-use needlebench_cell::{Overrides, ResolvedScenario, resolve_scenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_planning::Planner;
+use needlebench_scenario::{Overrides, ResolvedScenario, resolve_scenario};
 
 const SEEDS: u64 = 100;
 

@@ -1,16 +1,17 @@
-//! Why a motion is rejected, in words: the decisive reason, with its deepest value and what would free it.
+//! Why a motion is rejected, in words: the decisive reason, with its worst value and a hint.
 
+use needlebench_cell::Rule;
 use needlebench_clearance::{ClassCertificate, MotionCertificate, Nearby};
 use needlebench_kinematics::trajectory::LineError;
 
+use crate::Rejection;
 use crate::motion_plan::{Required, SearchEffort, Way};
 use crate::planner::Planner;
 use crate::rejection::of_distance;
-use crate::{Rejection, Rule};
 
 impl Planner<'_> {
-    /// Why a motion is rejected: first what every motion to this posture does, then what the transfer
-    /// does, each at its deepest.
+    /// Why a motion is rejected: first the violations common to all motions to this posture, then those of the
+    /// transit, each at its worst.
     pub(crate) fn too_near(
         &self,
         required: &Required,
@@ -27,8 +28,8 @@ impl Planner<'_> {
                 limit: self.limits().get(pair.class).floor_m,
                 unit: "m",
                 detail: format!(
-                    "{a} {does} {b} in the start posture: every motion begins there; another start would \
-                     free it"
+                    "{a} {does} {b} in the start posture, common to all motions; try another start \
+                     posture"
                 ),
                 class: Some(pair.class),
             });
@@ -43,8 +44,8 @@ impl Planner<'_> {
                 limit: self.limits().get(class).floor_m,
                 unit: "m",
                 detail: format!(
-                    "{a} {does} {b} in the {} at {:.2} s, at their nearest: the way along the needle, which no \
-                     transfer changes; another roll, a shorter `approach_mm` or another base may free it",
+                    "{a} {does} {b} in the {} (t = {:.2} s), common to all transit paths; try \
+                     another roll, a shorter `approach_mm` or another base placement",
                     found.phase.name(),
                     found.time_s
                 ),
@@ -56,7 +57,7 @@ impl Planner<'_> {
         let class = found.attained.class;
         let (close, does, value) = Self::broken(found);
         let place = format!(
-            "{a} {does} {b} in the {} at {:.2} s, at their nearest",
+            "{a} {does} {b} in the {} (t = {:.2} s)",
             found.phase.name(),
             found.time_s
         );
@@ -65,17 +66,17 @@ impl Planner<'_> {
             Some(effort) => (
                 Rule::NoMotion,
                 format!(
-                    "no way around was found among {} random postures ({} looked at), and on the straight \
-                     one {place}; start and approach keep {kept_mm:.1} mm there: more \
-                     `motion_checks`, another start or another base may free it",
+                    "no alternative path found among {} random postures ({} checked), and on the \
+                     joint-space line {place}; start and approach allow {kept_mm:.1} mm there; try \
+                     more `motion_checks`, another start posture or another base placement",
                     effort.samples, effort.checks
                 ),
             ),
             None => (
                 close,
                 format!(
-                    "{place}; start and approach keep {kept_mm:.1} mm: a way around (`motion_checks`) may \
-                     free it"
+                    "{place}; start and approach allow {kept_mm:.1} mm; an alternative path \
+                     (`motion_checks`) may be feasible"
                 ),
             ),
         };
@@ -89,7 +90,7 @@ impl Planner<'_> {
         })
     }
 
-    /// Which rule a class breaks, what its two bodies do, in words, and the distance by which they do, m: the proven bound,
+    /// Which rule a class violates, what its two bodies do, in words, and their distance, m: the certified bound,
     /// of bodies that were not seen to touch 0 at least.
     fn broken(found: &ClassCertificate) -> (Rule, &'static str, f64) {
         let attained_m = found.attained.separation.distance_m;

@@ -1,18 +1,20 @@
 //! The motions of the ISO 9283 protocol: poses to postures, postures to one cycle.
 
 use nalgebra::{UnitVector3, Vector3};
-use needlebench_cell::iso9283::{DIRECTIONAL_POSES, Iso9283Protocol, POSE_COUNT, Stop};
-use needlebench_cell::{Cell, ResolvedScenario, Robot};
+use needlebench_cell::{Cell, Robot};
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::{Kinematics, SolutionKind, nearest_within_limits};
 use needlebench_kinematics::trajectory::{
     JointPath, JointTrajectory, LineError, MotionLimits, Phase, ProfileLimits,
 };
 use needlebench_kinematics::{JOINT_LABELS, Joints, NotUrGeometry, Pose};
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::iso9283::{DIRECTIONAL_POSES, Iso9283Protocol, POSE_COUNT, Stop};
 use std::borrow::Cow;
 
 use crate::limits::ClassLimits;
 use crate::motion::MotionChecker;
+use crate::rejection::distance_in_words;
 
 /// The order of the standard: from P1 to P5, P4, P3, P2 and back to P1; indices from 0.
 const ORDER: [usize; POSE_COUNT] = [4, 3, 2, 1, 0];
@@ -54,7 +56,7 @@ pub enum ProtocolError {
         others: String,
     },
     /// A pose at which a joint has no place in its range.
-    #[error("at P{pose} {joint} would have to stand at {position_deg:.1} deg, outside its range")]
+    #[error("at P{pose} {joint} would be at {position_deg:.1} deg, outside its range")]
     JointLimit {
         /// Number of the pose, from 1.
         pose: usize,
@@ -75,7 +77,8 @@ pub enum ProtocolError {
     },
     /// A motion that collides.
     #[error(
-        "on the way to P{pose} {a} comes within {distance_mm:.1} mm of {b} (limit {limit_mm:.1})"
+        "on the way to P{pose}, {}, clearance {limit_mm:.1} mm required",
+        distance_in_words(.a, .b, *.distance_mm)
     )]
     Collision {
         /// Number of the pose, from 1.
@@ -100,11 +103,11 @@ impl ProtocolError {
                 "move the cube (`cube_centre_mm`), make it smaller (`cube_edge_mm`), or choose \
                  another `configuration` or `guide_axis`"
             }
-            Self::JointLimit { .. } => "another `roll_deg` or `configuration` may do",
-            Self::Approach { .. } => "a shorter `approach_mm`, or 0 to leave the test out",
+            Self::JointLimit { .. } => "try another `roll_deg` or `configuration`",
+            Self::Approach { .. } => "use a shorter `approach_mm`, or 0 to omit the test",
             Self::Collision { .. } => {
-                "move the cube (`cube_centre_mm`), choose another `configuration`, or leave \
-                 phantom and table out of the scenario"
+                "move the cube (`cube_centre_mm`), choose another `configuration`, or omit phantom \
+                 and table from the scenario"
             }
         }
     }
@@ -146,8 +149,8 @@ pub fn plan_protocol(
     Ok(plan)
 }
 
-/// Joint positions at all poses: the configuration's, with the whole turns that are nearest to
-/// the start posture at P1 and nearest to P1 at the others.
+/// Joint positions at all poses: the configuration's, with the 2π equivalents that are nearest to the start posture at
+/// P1 and nearest to P1 at the others.
 fn postures(
     protocol: &Iso9283Protocol,
     kinematics: &Kinematics,
@@ -172,9 +175,9 @@ fn postures(
                 pose,
                 configuration: protocol.configuration.label(),
                 others: if others.is_empty() {
-                    " and in every other one".to_owned()
+                    " and in all others".to_owned()
                 } else {
-                    format!("; {} reach it", others.join(", "))
+                    format!("; within reach of {}", others.join(", "))
                 },
             });
         };

@@ -1,7 +1,7 @@
-//! From goals to candidates and motions: which configurations work, and why others do not.
+//! From goals to candidates and motions: which configurations are feasible, and why the others are not.
 //!
-//! For each goal all eight configurations get a [`ConfigurationPlan`], never fewer: one that
-//! cannot work carries the rules that reject it, the first failing one first.
+//! For each goal all eight configurations get a [`ConfigurationPlan`], never fewer: one that is infeasible carries the
+//! rules that reject it, the first failing one first.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod blocked;
@@ -29,7 +29,7 @@ pub use plan::GoalPlan;
 pub use planner::{Candidate, Planner, PostureMargins};
 pub use press::{PressError, PressPlan, stage_press};
 pub use reach::out_of_reach_m;
-pub use rejection::{Rejection, Rule};
+pub use rejection::Rejection;
 pub use route::{
     RouteClearance, RouteJudgement, crossed_fissures, judge_route, judge_route_beside,
     judged_tissues, needle_route, route_rejection,

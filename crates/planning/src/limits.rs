@@ -1,26 +1,26 @@
-//! What clearances may be and ought to be, class by class: the one home of all limits that postures and
-//! motions are planned for.
+//! Limits and desired values of clearances, class by class: the only place of all limits that postures and motions are
+//! planned for.
 //!
 //! Four values of each class, never falling from one to the next:
 //!
 //! - the *floor* (`[planning]`): what is below it is rejected;
-//! - what is *judged* (`[criteria]`, else the floor): what is below it fails;
-//! - what is *wanted*: that with the reserve `clearance_reserve_mm`, by which a simulated motion may be off
-//!   its plan;
+//! - the *required* clearance (`[criteria]`, else the floor): what is below it fails;
+//! - the *desired* clearance: that with the reserve `clearance_reserve_mm`, by which a simulated motion may be off its
+//!   plan;
 //! - what is *ample*: beyond it nothing is gained, so that no motion is made longer for more.
 //!
-//! Of postures and motions that are not rejected those are preferred that fall short of what is judged by
-//! least, summed over the classes; of equal ones those that fall short of what is wanted by least.
+//! Of postures and motions that are not rejected those are preferred that fall short of the required clearances by
+//! least, summed over the classes; of equal ones those that fall short of the desired clearances by least.
 
 use needlebench_cell::ClearanceClass;
-use needlebench_cell::scenario::Scenario;
 use needlebench_clearance::{ClassMinima, MotionCertificate};
+use needlebench_scenario::scenario::Scenario;
 
 /// Number of classes.
 pub(crate) const CLASS_COUNT: usize = ClearanceClass::ALL.len();
 
-/// Clearance from itself that is ample, as a share of the one at which the ranking's utility is full. By
-/// its build the arm keeps about that one whatever it does, and no way around changes it.
+/// Clearance from itself that is ample, as a share of the one at which the ranking's utility is full. It is inherent in
+/// the arm, and no alternative path changes it.
 const AMPLE_SELF_SHARE: f64 = 0.5;
 
 /// Limits of one class, m.
@@ -44,13 +44,13 @@ pub struct ClassLimits([ClassLimit; CLASS_COUNT]);
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ByClass([f64; CLASS_COUNT]);
 
-/// How far clearances fall short, m, each a sum over the classes and not above 0. The order is that of
-/// preference: first what is judged, then the reserve.
+/// How far clearances fall short, m, each a sum over the classes and not above 0. The order is that of preference:
+/// first the required clearances, then the reserve.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub struct Shortfall {
-    /// Of what is judged.
+    /// Of the required clearances.
     pub judged_m: f64,
-    /// Of what is wanted.
+    /// Of the desired clearances.
     pub reserve_m: f64,
 }
 
@@ -171,7 +171,7 @@ impl ByClass {
         Self(ClearanceClass::ALL.map(clearance_m))
     }
 
-    /// The proven lower bounds of a motion.
+    /// The certified lower bounds of a motion.
     pub fn proven(certificate: &MotionCertificate) -> Self {
         let mut all = [f64::INFINITY; CLASS_COUNT];
         for (class, found) in certificate.iter() {
@@ -180,7 +180,7 @@ impl ByClass {
         Self(all)
     }
 
-    /// What is attained along a motion, at least the proven bounds.
+    /// What is attained along a motion, at least the certified bounds.
     pub(crate) fn attained(certificate: &MotionCertificate) -> Self {
         let mut all = [f64::INFINITY; CLASS_COUNT];
         for (class, found) in certificate.iter() {

@@ -1,9 +1,9 @@
-//! What a motion keeps of the clearance that its configuration allows.
+//! Margins of a motion, of those that its configuration allows.
 //!
-//! Some postures a configuration must take, whatever way leads there: the start, the approach and the place
-//! where it holds. Their clearances bound what any motion can keep, class by class: what is *attainable*. The
-//! transfer in between is free, so it ought never to come nearer to anything than those postures do. Beyond
-//! what is ample (`ClassLimit::ample_m`) more is not looked for.
+//! Some postures a configuration must take, whatever way leads there: the start, the approach and the place where it
+//! holds. Their clearances bound what any motion can keep, class by class: what is *attainable*. The transit in between
+//! is free, so it ought never to come nearer to anything than those postures do. Beyond what is ample
+//! (`ClassLimit::ample_m`) more is not looked for.
 
 use needlebench_cell::ClearanceClass;
 use needlebench_clearance::{
@@ -41,12 +41,12 @@ impl LimitedBy {
     }
 }
 
-/// How the search for a transfer ended.
+/// How the search for a transit ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchEnd {
-    /// The transfer keeps what the other postures do, or what is ample: none keeps more that counts.
+    /// The transit keeps what the other postures do, or what is ample: none keeps more that counts.
     Bound,
-    /// A posture that every motion must take is nearer than allowed: no transfer helps.
+    /// A posture that every motion must take is nearer than allowed: no transit helps.
     Proof,
     /// What may be looked at was used up: there may be a better transfer.
     Budget,
@@ -63,12 +63,12 @@ impl SearchEnd {
     }
 }
 
-/// What a motion keeps in one class. All are proven lower bounds, m.
+/// Margins of a motion in one class. All are certified lower bounds, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClassMargin {
     /// The class.
     pub class: ClearanceClass,
-    /// What is judged.
+    /// The required clearance.
     pub limit_m: f64,
     /// Clearance of the postures that the motion must take.
     pub attainable_m: f64,
@@ -79,27 +79,27 @@ pub struct ClassMargin {
 }
 
 impl ClassMargin {
-    /// What it keeps beyond what is judged, m.
+    /// Its clearance in excess of the required one, m.
     pub fn margin_m(&self) -> f64 {
         self.achieved_m - self.limit_m
     }
 }
 
-/// What a motion keeps of the clearance that its configuration allows.
+/// Margins of a motion, of those that its configuration allows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Margin {
     /// Class by class, of those that the cell has pairs of and a motion decides.
     pub classes: Vec<ClassMargin>,
     /// How the search ended.
     pub end: SearchEnd,
-    /// What the straight transfer would have kept; none where the transfer is straight.
+    /// What the straight transit would have kept; none where the transit is straight.
     pub straight: Option<Straight>,
 }
 
-/// The straight transfer that a way around, or other whole turns, replace.
+/// The straight transit that an alternative path, or other 2π equivalents, replace.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Straight {
-    /// Least clearance of the motion from the surroundings, proven, m; negative where it is blocked.
+    /// Certified minimum clearance of the motion from the surroundings, m; negative where it is blocked.
     pub clearance_m: f64,
     /// The same of the motion that replaces it, m.
     pub instead_m: f64,
@@ -114,7 +114,7 @@ impl Margin {
             .min_by(|a, b| a.margin_m().total_cmp(&b.margin_m()))
     }
 
-    /// Least margin beyond what is judged that any motion to this posture could keep from its surroundings, m.
+    /// Least margin beyond the required clearance that any motion to this posture could keep from its surroundings, m.
     pub fn attainable_m(&self) -> Option<f64> {
         let all = self.surroundings();
         all.map(|each| each.attainable_m - each.limit_m)
@@ -221,7 +221,7 @@ impl MotionChecker<'_> {
         certify(self.model, trajectory, &self.options())
     }
 
-    /// Certificate of the transfer of a motion, as far as it is nearer than what is enough.
+    /// Certificate of the transit of a motion, as far as it is nearer than what is enough.
     pub(crate) fn of_transfer(
         &self,
         trajectory: &JointTrajectory,

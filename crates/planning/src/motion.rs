@@ -3,11 +3,11 @@
 use std::sync::OnceLock;
 
 use nalgebra::Point3;
-use needlebench_cell::scenario::PlanningSection;
 use needlebench_cell::{BodyKind, Cell, ClearanceClass, Frame};
 use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby, PairClearance};
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
+use needlebench_scenario::scenario::PlanningSection;
 
 use crate::limits::{ByClass, ClassLimits};
 
@@ -147,9 +147,9 @@ impl<'a> MotionChecker<'a> {
         None
     }
 
-    /// Whether the straight joint motion between two postures keeps some clearances, its first end
-    /// not looked at; and the number of postures that it took. No point of the arm moves by more
-    /// than the spacing from one of them to the next.
+    /// Whether the joint-space line between two postures has the required clearances `least_m`, its first end not
+    /// checked; and the number of postures that were checked. No point of the arm moves by more than the spacing from
+    /// one of them to the next.
     pub(crate) fn keeps_straight(
         &self,
         from: &Joints,

@@ -1,19 +1,20 @@
-//! The motion of a configuration: transfer, straight approach, hold; and the way back out.
+//! The motion of a configuration: transit, linear approach, hold; and the retreat.
 
 use std::f64::consts::TAU;
 
 use nalgebra::UnitVector3;
-use needlebench_cell::Goal;
+use needlebench_cell::Rule;
 use needlebench_clearance::MotionCertificate;
 use needlebench_kinematics::ik::{Configuration, WrapOrder, WrapSearch};
 use needlebench_kinematics::trajectory::{JointPath, JointTrajectory, LineError, Phase};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
+use needlebench_scenario::Goal;
 
+use crate::Rejection;
 use crate::limits::ByClass;
 use crate::margin::{Margin, Parts, SAME_M, SearchEnd, Straight};
 use crate::planner::{Candidate, Planner};
 use crate::transfer::{Budget, TransferSearch};
-use crate::{Rejection, Rule};
 
 /// What became of one configuration.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,18 +23,17 @@ pub struct ConfigurationPlan {
     pub configuration: Configuration,
     /// Its best posture; `None` if there is none at all.
     pub candidate: Option<Candidate>,
-    /// Rules that it breaks, first failing one first; empty if it works.
+    /// Rules that it violates, first failing one first; empty if it is feasible.
     pub rejections: Vec<Rejection>,
     /// Motion from the start posture; `None` if there is no way.
     pub trajectory: Option<JointTrajectory>,
-    /// The same way back: straight out along the needle axis first. `None` unless the configuration
-    /// works.
+    /// The retreat: first straight out along the needle axis. `None` unless the configuration is feasible.
     pub retreat: Option<JointTrajectory>,
-    /// What the search for a way around cost; `None` where the straight motion was tried alone.
+    /// What the search for an alternative path cost; `None` where the straight motion was tried alone.
     pub search: Option<SearchEffort>,
     /// What the motion keeps of the clearance that the posture allows; `None` without a motion.
     pub margin: Option<Margin>,
-    /// Proven clearances of the whole motion, to the scenario's tolerance.
+    /// Certified clearances of the whole motion, to the scenario's tolerance.
     pub certificate: Option<MotionCertificate>,
 }
 
@@ -66,10 +66,10 @@ pub struct SearchEffort {
     pub seed: u64,
 }
 
-/// Combinations of whole turns that are tried for the transfer, shortest first.
+/// Combinations of 2π equivalents that are tried for the transit, shortest first.
 const WRAP_TRIES: usize = 8;
 
-/// How much corners of a way around are rounded, in the order in which it is tried.
+/// How much corners of an alternative path are rounded, in the order in which it is tried.
 const ROUNDINGS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 
 /// Part of the postures that may be looked at that the search for all the clearance that there is may use,
@@ -79,7 +79,7 @@ const SHARE: u64 = 8;
 const PULL_SHARE: u64 = 40;
 /// How often one way is pulled at most.
 const PULLS: u32 = 6;
-/// What a way around has to gain for a longer motion to be worth it, m.
+/// What an alternative path has to gain for a longer motion to be worth it, m.
 const LEAST_GAIN_M: f64 = 5e-4;
 
 /// What searches may look at, and what they have looked at.
@@ -91,7 +91,7 @@ struct Looks<'l> {
     left: &'l mut u64,
 }
 
-/// Where a way around comes from.
+/// Where an alternative path comes from.
 enum Source<'w> {
     /// From random postures, others in each round.
     Random(u64),
@@ -113,9 +113,9 @@ pub(crate) struct Way {
     turns: [i32; JOINT_COUNT],
     transfer: Transfer,
     trajectory: JointTrajectory,
-    /// Of the transfer alone.
+    /// Of the transit alone.
     pub certificate: MotionCertificate,
-    /// Proven clearances of the transfer.
+    /// Certified clearances of the transit.
     keeps: ByClass,
     /// Corners of the polygon that it follows, ends included.
     waypoints: Vec<Joints>,
@@ -125,7 +125,7 @@ pub(crate) struct Way {
 #[derive(Debug, Clone)]
 pub(crate) struct Required {
     pub candidate: Candidate,
-    /// Rules that the posture breaks.
+    /// Rules that the posture violates.
     pub rejections: Vec<Rejection>,
     line: JointPath,
     approach: MotionCertificate,
@@ -154,15 +154,15 @@ impl Required {
         self.parts(way).achieved()
     }
 
-    /// The transfer keeps what start and approach do.
+    /// The transit keeps what start and approach do.
     pub(crate) fn is_reached_by(&self, way: &Way) -> bool {
         way.keeps.most_below(&self.target) <= SAME_M
     }
 }
 
 impl Planner<'_> {
-    /// The part of a motion that a posture decides: its approach, certified, and the whole turns with
-    /// which it can be reached.
+    /// The part of a motion that a posture decides: its approach, certified, and the 2π equivalents with which it can
+    /// be reached.
     ///
     /// # Errors
     /// The plan of a posture to which there is no motion at all.
@@ -181,7 +181,7 @@ impl Planner<'_> {
                 value: self.cell().robot.limits.margin(&line.start()),
                 limit: 0.0,
                 unit: "1",
-                detail: "the approach leaves the joint ranges, whatever the whole turns".to_owned(),
+                detail: "the approach leaves the joint ranges, for all 2 pi equivalents".to_owned(),
                 class: None,
             }),
         };
@@ -211,8 +211,8 @@ impl Planner<'_> {
         })
     }
 
-    /// The straight transfer that keeps most, those with fewer turns first: the first that keeps what
-    /// start and approach do, else the first that is free, else the first.
+    /// The straight transit that keeps most, those with fewer turns first: the first that keeps what start and approach
+    /// do, else the first that is free, else the first.
     pub(crate) fn straight(&self, required: &Required) -> Way {
         let first = self.straight_with(required, required.wraps[0]);
         if required.is_reached_by(&first) || !self.is_worth_a_search(required) {
@@ -278,8 +278,8 @@ impl Planner<'_> {
         is_wanted && required.attainable().most_below(&self.limits().floors()) <= 0.0
     }
 
-    /// The transfer that keeps most of those found: as much as start and approach, or as much as the
-    /// postures that may be looked at allow. What it looks at is subtracted from `checks_left`.
+    /// The transit that keeps most of those found: as much as start and approach, or as much as the postures that may
+    /// be looked at allow. What it looks at is subtracted from `checks_left`.
     pub(crate) fn improved(
         &self,
         goal: &Goal,
@@ -476,7 +476,7 @@ impl Planner<'_> {
         }
     }
 
-    /// Searches a way around that keeps some clearances, to the beginning of the approach in any of its
+    /// Searches an alternative path that keeps some clearances, to the beginning of the approach in any of its
     /// whole-turn images.
     fn way_around(
         &self,
@@ -603,8 +603,8 @@ impl Planner<'_> {
         }
     }
 
-    /// Whole turns that keep the approach inside the joint ranges, shortest transfer first; at most
-    /// one either way.
+    /// 2π equivalents with the approach inside the joint ranges, as full revolutions per joint, shortest transit first;
+    /// at most one revolution either way.
     fn wraps(&self, line: &JointPath) -> Vec<[i32; JOINT_COUNT]> {
         // Where the approach may start for its end to be inside as well.
         let mut limits = self.cell().robot.limits;

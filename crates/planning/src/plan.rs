@@ -4,15 +4,16 @@ use std::cell::OnceCell;
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
-use needlebench_cell::{Goal, Roll};
+use needlebench_cell::Rule;
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
+use needlebench_scenario::{Goal, Roll};
 
 use crate::family::{Member, Merit, Sweep};
 use crate::limits::{ByClass, Shortfall};
 use crate::margin::SAME_M;
 use crate::motion_plan::{ConfigurationPlan, Required, Way};
 use crate::planner::{Candidate, Planner};
-use crate::{Rejection, Rule, route_rejection};
+use crate::{Rejection, route_rejection};
 
 /// All eight configurations of one goal.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,17 +26,16 @@ pub struct GoalPlan {
 const MOTION_TRIES: usize = 12;
 /// Rolls that are looked at to say which ones would be free.
 const ROLLS_SAID: u32 = 72;
-/// Rolls of each range that are tried where none of the first ones has a motion that keeps what is judged.
+/// Rolls of each range that are tried where none of the first ones has a motion that keeps the required clearances.
 const RANGE_TRIES: u32 = 9;
-/// Postures of one configuration for which a way around is searched where the straight motion is
-/// blocked.
+/// Postures of one configuration for which an alternative path is searched where the straight motion is blocked.
 const SEARCH_TRIES: usize = 3;
 
 impl Planner<'_> {
     /// Plans all eight configurations of a goal.
     ///
-    /// Motions are planned to a goal whose needle's route is refused too: what a configuration could do is
-    /// worth knowing, but none works.
+    /// Motions are planned to a goal whose needle path is refused too: what a configuration could do is worth knowing,
+    /// but none works.
     pub fn plan(&self, goal: &Goal) -> GoalPlan {
         let route = route_rejection(self.resolved, goal);
         let plan = |configuration| self.plan_on_route(goal, configuration, route.as_ref());
@@ -64,9 +64,9 @@ impl Planner<'_> {
         plan
     }
 
-    /// For each of the eight configurations the posture that a plan tries first: of those that break
-    /// no rule the best by the scenario's `roll_aim`, else the one that comes nearest to working. No
-    /// motions are looked at. Where the needle's route is refused, all are.
+    /// For each of the eight configurations the posture that a plan tries first: of those that break no rule the best
+    /// by the scenario's `roll_aim`, else the one that comes nearest to working. No motions are looked at. Where the
+    /// needle path is refused, all are.
     pub fn postures(&self, goal: &Goal) -> [Member; 8] {
         let route = route_rejection(self.resolved, goal);
         if let Roll::Fixed(roll_rad) = goal.roll {
@@ -86,7 +86,7 @@ impl Planner<'_> {
         member.on_route(route_rejection(self.resolved, goal).as_ref())
     }
 
-    /// The same without a look at the needle's route, which all configurations share.
+    /// The same without a look at the needle path, which all configurations share.
     pub fn posture_off_route(&self, goal: &Goal, configuration: Configuration) -> Member {
         if let Roll::Fixed(roll_rad) = goal.roll {
             return self.member_at(goal, configuration, roll_rad);
@@ -95,9 +95,9 @@ impl Planner<'_> {
         self.first(goal, configuration, &rolls)
     }
 
-    /// Of postures of a configuration at these rolls the best for the scenario's `roll_aim` that breaks no rule; where all
-    /// break one, the first that there is. Nothing between the rolls is looked at, and the needle's route neither: it
-    /// is for asking many goals.
+    /// Of postures of a configuration at these rolls the best for the scenario's `roll_aim` that violates no rule;
+    /// where all break one, the first that there is. Nothing between the rolls is looked at, and the needle path
+    /// neither: it is for asking many goals.
     pub fn best_of_rolls(
         &self,
         goal: &Goal,
@@ -130,7 +130,7 @@ impl Planner<'_> {
         member
     }
 
-    /// Members that work, the best first.
+    /// Feasible members, the best first.
     fn ranked(&self, goal: &Goal, configuration: Configuration, grid: &[Member]) -> Vec<Member> {
         let aim = self.planning().roll_aim;
         // The best of each range that works, then the rest of what works.
@@ -212,7 +212,7 @@ impl Planner<'_> {
         }
     }
 
-    /// Members at even rolls within each range of a configuration, those first that keep what is judged and
+    /// Members at even rolls within each range of a configuration, those first that keep the required clearances and
     /// are best for the aim.
     fn within_ranges(
         &self,
@@ -246,8 +246,8 @@ impl Planner<'_> {
         all.map(|(_, candidate)| (candidate, Vec::new())).collect()
     }
 
-    /// The best motion to one of some postures, tried in their order, and whether it keeps all that will be
-    /// judged: if not, other postures may.
+    /// The best motion to one of some postures, tried in their order, and whether it keeps all that will be evaluated:
+    /// if not, other postures may.
     fn best_motion(
         &self,
         goal: &Goal,
@@ -324,8 +324,8 @@ impl Planner<'_> {
             .expect("there is at least one candidate")
     }
 
-    /// Adds to the first rule that a posture breaks, the decisive one, whether other rolls break rules too and
-    /// what else may free the configuration.
+    /// Adds to the first rule that a posture violates, the decisive one, whether other rolls violate rules too and
+    /// what else may make the configuration feasible.
     fn say_what_frees(
         &self,
         goal: &Goal,
@@ -336,33 +336,34 @@ impl Planner<'_> {
             return;
         };
         let others = match first.rule {
-            Rule::Unreachable => "another place of the base may reach it",
-            Rule::Collision | Rule::TooClose => "another base, tool or limit may free it",
-            Rule::NeedleCorridor => "another base or tool may free it",
-            Rule::Singular | Rule::JointLimit | Rule::Approach => "another base may free it",
+            Rule::Collision | Rule::TooClose => "another base placement, tool or limit",
+            Rule::NeedleCorridor => "another base placement or tool",
+            Rule::Unreachable | Rule::Singular | Rule::JointLimit | Rule::Approach => {
+                "another base placement"
+            }
             Rule::NeedleRoute | Rule::Merged | Rule::NearestOnly | Rule::NoMotion => return,
         };
         first.detail = match goal.roll {
             Roll::Free => {
                 let detail = &first.detail;
-                format!("{detail}; every other roll of the guide is as bad or worse: {others}")
+                format!("{detail}; no other roll angle is better; try {others}")
             }
             Roll::Fixed(roll_rad) => {
-                let fixed = format!("the goal fixes its roll at {}", degrees(roll_rad));
+                let fixed = format!("roll fixed at {} by the goal", degrees(roll_rad));
                 let free = self.free_rolls(goal, configuration);
                 if free.is_empty() {
                     format!(
-                        "{}; {fixed}, and no other is free either: {others}",
+                        "{}; {fixed}, no other roll angle is feasible; try {others}",
                         first.detail
                     )
                 } else {
-                    format!("{}; {fixed}, postures are free {free}", first.detail)
+                    format!("{}; {fixed}, posture feasible at {free}", first.detail)
                 }
             }
         };
     }
 
-    /// Ranges of roll in which a configuration's postures break no rule, in words; empty if there are none.
+    /// Ranges of roll in which a configuration's postures violate no rule, in words; empty if there are none.
     fn free_rolls(&self, goal: &Goal, configuration: Configuration) -> String {
         let rolls: Vec<f64> = (0..ROLLS_SAID)
             .map(|k| TAU * f64::from(k) / f64::from(ROLLS_SAID))
@@ -371,10 +372,10 @@ impl Planner<'_> {
         let family = self.family_for(goal, configuration, &grid, &[]);
         let ranges = family.ranges.iter().map(|range| {
             if range.is_whole_circle {
-                "at any other".to_owned()
+                "any other roll angle".to_owned()
             } else {
                 let [from, to] = [range.from_rad, range.to_rad].map(degrees);
-                format!("from {from} to {to}")
+                format!("roll {from} to {to}")
             }
         });
         ranges.collect::<Vec<_>>().join(" and ")

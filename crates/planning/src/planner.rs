@@ -1,18 +1,20 @@
-//! What plans are made with: the solver, the checker, and one posture with what can be said of it.
+//! Solver and checker that plans are made with, and the evaluation of one posture.
 
 use std::sync::OnceLock;
 
-use needlebench_cell::scenario::PlanningSection;
-use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, part_in_words};
+use needlebench_cell::{Cell, ClearanceClass, Rule, part_in_words};
 use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby};
 use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, Solutions};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
+use needlebench_scenario::scenario::PlanningSection;
+use needlebench_scenario::{Goal, ResolvedScenario};
 
+use crate::Rejection;
 use crate::limits::{ByClass, ClassLimits};
 use crate::motion::MotionChecker;
 use crate::rejection::of_distance;
-use crate::{Rejection, Rule};
-/// Where a final posture stands between its limits and singularities.
+
+/// Margins of a final posture from joint limits and singularities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PostureMargins {
     /// 1 in the middle of every joint's range, 0 at a limit.
@@ -34,16 +36,16 @@ struct Singularity {
     shoulder_m: f64,
 }
 
-/// A posture that brings the guide to its place.
+/// A posture that brings the guide to its planned pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// Final joint positions, rad, wrapped as the motion reaches them.
     pub joints: Joints,
     /// Angle of the guide about the needle, rad.
     pub roll_rad: f64,
-    /// Whole turns that were added to the positions in `(-pi, pi]`.
+    /// 2π equivalent: full revolutions added to the positions in `(-pi, pi]`.
     pub wrap: [i32; JOINT_COUNT],
-    /// Distance of the flange from its planned place, m.
+    /// Distance of the flange from its planned position, m.
     pub residual_m: f64,
     /// Angle of the flange from its planned orientation, rad.
     pub residual_rad: f64,
@@ -62,7 +64,7 @@ pub struct Planner<'a> {
     kinematics: Kinematics,
     pub(crate) checker: MotionChecker<'a>,
     /// Keys of the scenario's `[ranking]` with weights and utilities.
-    ranking_aims: Vec<(&'static str, needlebench_cell::ranking::Aim)>,
+    ranking_aims: Vec<(&'static str, needlebench_scenario::ranking::Aim)>,
     /// Least clearances of the start posture, of bodies alone; found when a motion is planned.
     start_clearance: OnceLock<ByClass>,
 }
@@ -136,11 +138,11 @@ impl<'a> Planner<'a> {
         &self.resolved.scenario.planning
     }
 
-    pub(crate) fn ranking_aims(&self) -> &[(&'static str, needlebench_cell::ranking::Aim)] {
+    pub(crate) fn ranking_aims(&self) -> &[(&'static str, needlebench_scenario::ranking::Aim)] {
         &self.ranking_aims
     }
 
-    /// What clearances may be and ought to be.
+    /// Limits and desired values of clearances.
     pub fn limits(&self) -> &ClassLimits {
         &self.checker.limits
     }
@@ -155,12 +157,12 @@ impl<'a> Planner<'a> {
         crate::reach::base_link_from_flange(self.resolved, goal, roll_rad)
     }
 
-    /// Rolls that are looked at: all round where it is free, else the one.
+    /// Rolls that are evaluated: the full circle if it is free, else the one.
     pub fn rolls(&self, goal: &Goal, count: u32) -> Vec<f64> {
         crate::reach::rolls(goal, count)
     }
 
-    /// Margins, clearances and broken rules of one posture. `nearby` is of the posture before.
+    /// Margins, clearances and violated rules of one posture. `nearby` is of the posture before.
     pub(crate) fn candidate(
         &self,
         roll_rad: f64,
@@ -195,7 +197,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Joint positions of a configuration that brings the guide to a goal at a roll, if it reaches it and
-    /// breaks no rule about its joints: what [`Planner::member_at`] says of all but clearances.
+    /// violates no rule about its joints: the result of [`Planner::member_at`] without clearances.
     pub fn reached(
         &self,
         goal: &Goal,
@@ -209,7 +211,7 @@ impl<'a> Planner<'a> {
         is_sound.then_some(solution.joints)
     }
 
-    /// Whether a posture breaks no rule: what [`Planner::candidate`] says, without numbers.
+    /// Whether a posture violates no rule: the result of [`Planner::candidate`], without numbers.
     pub(crate) fn works(&self, solution: &Solution, nearby: &mut Nearby) -> bool {
         self.joint_rules(solution).is_empty()
             && self.checker.is_free(&solution.joints, nearby, |class| {
@@ -217,7 +219,7 @@ impl<'a> Planner<'a> {
             })
     }
 
-    /// The rules that the joint positions alone break.
+    /// The rules that the joint positions alone violate.
     pub(crate) fn joint_rules(&self, solution: &Solution) -> Vec<Rejection> {
         let planning = &self.resolved.scenario.planning;
         let limits = &self.resolved.cell.robot.limits;
@@ -228,7 +230,7 @@ impl<'a> Planner<'a> {
                 value: solution.residual_m,
                 limit: 1e-9,
                 unit: "m",
-                detail: "the refined posture misses the pose".to_owned(),
+                detail: "the refined posture does not attain the pose".to_owned(),
                 class: None,
             });
         }
@@ -244,7 +246,7 @@ impl<'a> Planner<'a> {
                         limit.lower_rad
                     },
                     unit: "rad",
-                    detail: format!("{label} has no place in its range"),
+                    detail: format!("{label} is outside its range"),
                     class: None,
                 });
             }
@@ -288,7 +290,7 @@ impl<'a> Planner<'a> {
         rejections
     }
 
-    /// Least clearances of a posture, and the rules about them that it breaks.
+    /// Minimum clearances of a posture, and the rules about them that it violates.
     pub fn clearance_rules(&self, q: &Joints) -> (ClassMinima, Vec<Rejection>) {
         self.clearance_rules_near(q, &mut Nearby::default())
     }
@@ -328,7 +330,7 @@ impl<'a> Planner<'a> {
                 value: corridor.separation.distance_m,
                 limit: 0.0,
                 unit: "m",
-                detail: format!("{} stands behind the guide", part_in_words(blocker)),
+                detail: format!("{} blocks the access zone", part_in_words(blocker)),
                 class: Some(ClearanceClass::NeedleCorridor),
             });
         }
@@ -377,15 +379,15 @@ pub(crate) fn absent(configuration: Configuration, found: &Solutions) -> Rejecti
 fn unreachable_detail(reason: needlebench_kinematics::ik::Unreachable) -> String {
     use needlebench_kinematics::ik::Unreachable;
     match reason {
-        Unreachable::WristTooNear { .. } => "the wrist is too near to the shoulder axis",
-        Unreachable::ElbowTooShort { .. } => "upper arm and forearm are too short",
-        Unreachable::ElbowTooLong { .. } => "the elbow cannot fold so far",
+        Unreachable::WristTooNear { .. } => "out of reach, wrist too close to the shoulder axis",
+        Unreachable::ElbowTooShort { .. } => "out of reach, upper arm and forearm too short",
+        Unreachable::ElbowTooLong { .. } => "out of reach, elbow cannot fold far enough",
         Unreachable::NoCounterpart { .. } => {
-            "the nominal arm reaches the pose, the calibrated one does not"
+            "within reach of the nominal arm, not of the calibrated one"
         }
         Unreachable::NotFinite => "the pose is not finite",
-        Unreachable::NotARotation => "the orientation is no rotation",
-        Unreachable::TooFar { .. } => "the pose is farther away than any arm reaches",
+        Unreachable::NotARotation => "the orientation is not a rotation",
+        Unreachable::TooFar { .. } => "out of reach, pose farther away than any arm reaches",
     }
     .to_owned()
 }
@@ -400,10 +402,7 @@ fn merged(configuration: Configuration, solutions: &[Solution]) -> Rejection {
         limit: 0.0,
         unit: "1",
         detail: match twin {
-            Some(twin) => format!(
-                "{configuration} is the same posture as {}",
-                twin.configuration
-            ),
+            Some(twin) => format!("{configuration} coincides with {}", twin.configuration),
             None => format!("{configuration} does not exist at this pose"),
         },
         class: None,

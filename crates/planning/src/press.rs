@@ -1,4 +1,4 @@
-//! Contacts that are asked for: an obstacle in the way of a planned posture, and a motion into it.
+//! Prescribed contacts: an obstacle in the way of a planned posture, and a motion into it.
 
 use nalgebra::{Translation3, Vector3};
 use needlebench_cell::{Cell, ClearanceClass, Frame};
@@ -10,13 +10,13 @@ use std::borrow::Cow;
 /// Steps of the search for a posture of a given depth.
 const TRIES: usize = 60;
 
-/// How near to the depth that is asked for is near enough, m.
+/// Tolerance of the prescribed depth, m.
 const DEPTH_TOLERANCE_M: f64 = 1e-8;
 
 /// Largest step of the search, as a motion of the point that touches, m.
 const LARGEST_STEP_M: f64 = 2e-3;
 
-/// Time at rest after the way back, s: tips recover within 0.2 s.
+/// Time at rest after the retreat, s: tips recover within 0.2 s.
 const REST_S: f64 = 0.4;
 
 /// An obstacle in the way, and the motion into it and back.
@@ -48,15 +48,17 @@ pub enum PressError {
         class: &'static str,
     },
     /// The search for a posture of the depth did not get there.
-    #[error("no posture lies {depth_m} m in the obstacle: the search ended at {reached_m:.6} m")]
+    #[error(
+        "no posture penetrates the obstacle by {depth_m} m: the search ended at {reached_m:.6} m"
+    )]
     NotReached {
-        /// Depth asked for, m.
+        /// Prescribed depth, m.
         depth_m: f64,
         /// Depth reached, m; negative is a gap.
         reached_m: f64,
     },
     /// Something else would touch as well.
-    #[error("{a} and {b} would touch as well")]
+    #[error("{a} and {b} would also touch")]
     Blocked {
         /// First solid.
         a: String,

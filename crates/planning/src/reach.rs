@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use needlebench_cell::{Goal, ResolvedScenario, Roll};
 use needlebench_kinematics::Pose;
 use needlebench_kinematics::ik::{Kinematics, Rows};
+use needlebench_scenario::{Goal, ResolvedScenario, Roll};
 
 /// Pose of the flange in `base_link` that brings the guide to a goal.
 pub(crate) fn base_link_from_flange(
@@ -28,9 +28,9 @@ pub(crate) fn rolls(goal: &Goal, count: u32) -> Vec<f64> {
     }
 }
 
-/// Of a goal that no configuration reaches at any roll that [`Planner::postures`](crate::Planner::postures) looks at: how far
-/// the one falls short that comes nearest, m, negative, which is the largest surplus of those postures unless the
-/// needle's route is refused too. None where any reaches it at any of them.
+/// Of a goal that no configuration reaches at any roll that [`Planner::postures`](crate::Planner::postures) looks at:
+/// how far the one falls short that comes nearest, m, negative, which is the largest constraint margin of those
+/// postures unless the needle path is refused too. None where any reaches it at any of them.
 ///
 /// `kinematics` is of the scenario's chain, within its limits. Closed-form inverse kinematics of all rolls at once: a microsecond or
 /// so, where a posture with its clearances takes a thousand times as long.

@@ -1,15 +1,14 @@
 //! What the planned needle passes on its way from the skin to its end.
 
 use nalgebra::Point3;
-use needlebench_cell::phantom::{RouteObstacle, Tissue};
-use needlebench_cell::scenario::NeedleRouteSection;
-use needlebench_cell::{
-    Cell, ClearanceClass, Goal, PlacedPhantom, ResolvedScenario, part_in_words,
-};
+use needlebench_cell::{Cell, ClearanceClass, Rule, part_in_words};
 use needlebench_clearance::ROUNDING_M;
 use needlebench_geometry::Separation;
+use needlebench_phantom::{RouteObstacle, Tissue};
+use needlebench_scenario::scenario::NeedleRouteSection;
+use needlebench_scenario::{Goal, PlacedPhantom, ResolvedScenario};
 
-use crate::{Rejection, Rule};
+use crate::Rejection;
 
 /// What a planned needle comes near to.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,8 +77,8 @@ fn nearest_of<'a>(
     })
 }
 
-/// Structures that the needle has to enter: the organ of the target, and what holds the lesion that it is
-/// aimed at, such as a rib.
+/// Structures that the needle must enter: the organ of the target, and what holds the lesion that it is aimed at, such
+/// as a rib.
 fn entered<'a>(placed: &'a PlacedPhantom, goal: &'a Goal) -> Vec<&'a str> {
     let mut entered: Vec<&str> = goal.target_organ.as_deref().into_iter().collect();
     if goal.lesion.is_some() {
@@ -124,7 +123,7 @@ pub struct RouteJudgement<'a> {
     pub nearest: RouteClearance<'a>,
     /// The distance less what rounding may add to it, m.
     pub distance_m: f64,
-    /// The least that it has to be, m.
+    /// The required distance, m.
     pub margin_m: f64,
 }
 
@@ -174,15 +173,15 @@ pub fn judged_tissues<'a>(
     })
 }
 
-/// Why no configuration is to go to a goal; `None` if the needle's route keeps its margins.
+/// Why a goal is rejected for all configurations; `None` if the needle path satisfies its margins.
 pub fn route_rejection(resolved: &ResolvedScenario, goal: &Goal) -> Option<Rejection> {
     let judged = judge_route(resolved, goal).filter(|judged| !judged.is_kept())?;
     let RouteObstacle { name, tissue, .. } = judged.nearest.part;
     let name = part_in_words(name);
     let does = if judged.distance_m < 0.0 {
-        "goes through"
+        "passes through"
     } else {
-        "comes too near to"
+        "is too close to"
     };
     Some(Rejection {
         rule: Rule::NeedleRoute,

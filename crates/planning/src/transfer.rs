@@ -10,8 +10,8 @@
 
 mod lift;
 
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{JOINT_COUNT, JointLimits, Joints};
+use needlebench_numerics::random::SplitMix64;
 
 use crate::limits::ByClass;
 use crate::motion::MotionChecker;
@@ -41,7 +41,7 @@ pub(crate) struct TransferSearch<'s> {
     speed: Joints,
     random: SplitMix64,
     budget: Budget,
-    /// Clearances that every posture has to keep.
+    /// Required clearances of every posture.
     least_m: ByClass,
     /// Postures looked at so far.
     pub checks: u64,
@@ -271,7 +271,7 @@ impl<'s> TransferSearch<'s> {
     }
 }
 
-/// Share of the whole way that a shortcut has to save.
+/// Share of the whole path that a shortcut must save.
 const LEAST_SAVING: f64 = 1e-3;
 
 fn root(position: &Joints) -> Node {

@@ -1,8 +1,8 @@
-//! What a needle's way is asked about.
+//! The anatomy along a needle path.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-/// What a needle has to keep away from.
+/// An obstacle of a needle path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Obstacle {
     /// Bone, whatever it is of.
@@ -17,7 +17,7 @@ impl Obstacle {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Bone, Self::Vessel, Self::Organ];
 
-    /// As JSON has it.
+    /// Name in JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bone => "bone",
@@ -63,10 +63,10 @@ pub struct Nearest {
     pub distance_m: f64,
 }
 
-/// The lungs on a needle's way.
+/// The lungs along a needle path.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LungPassage {
-    /// How often it enters a lung, from the skin to the target.
+    /// Number of pleural crossings into a lung, from the skin to the target.
     pub entries: u32,
     /// How much of it is in a lung, m.
     pub within_m: f64,
@@ -78,7 +78,7 @@ pub struct LungPassage {
     pub bullae: Vec<String>,
 }
 
-/// What stands around a target.
+/// The surroundings of a target.
 pub trait Anatomy: Sync {
     /// What it is made of: `voxels` or `solids`.
     fn kind(&self) -> &'static str;
@@ -89,10 +89,11 @@ pub trait Anatomy: Sync {
     /// Where a ray leaves the body for the first time.
     fn exit(&self, ray: &Ray) -> Exit;
 
-    /// Whether body or a marker is in the way outside the skin, between two distances from the target, m: an arm, a fold.
+    /// Whether body or a marker is in the way outside the skin, between two distances from the target, m: an arm, a
+    /// fold.
     fn is_body_between(&self, ray: &Ray, from_to_m: [f64; 2]) -> bool;
 
-    /// Whether the patient has anything of an obstacle, near or far: distances from what nobody has seen are no distances.
+    /// Whether the patient model has any structure of this kind: otherwise its distances are unknown.
     fn knows(&self, obstacle: Obstacle) -> bool;
 
     /// Lower bound of the distance of a stretch of a ray from an obstacle, m; infinite if there is none of it. Distances

@@ -26,7 +26,7 @@ pub fn angles_rad(outwards: &UnitVector3<f64>) -> [f64; 2] {
 
 /// The direction of an azimuth and an elevation, rad.
 pub fn outwards([azimuth, elevation]: [f64; 2]) -> UnitVector3<f64> {
-    needlebench_cell::direction(azimuth, elevation)
+    needlebench_scenario::direction(azimuth, elevation)
 }
 
 /// Directions on a ring about one, so far from it, rad.

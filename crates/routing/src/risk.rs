@@ -1,9 +1,9 @@
-//! How routes compare: published odds ratios, term by term.
+//! Risk of needle paths: published odds ratios, term by term.
 
 use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::UnitVector3;
-use needlebench_cell::scenario::OddsSection;
+use needlebench_scenario::scenario::OddsSection;
 use serde::Serialize;
 
 use crate::LungPassage;
@@ -11,12 +11,12 @@ use crate::LungPassage;
 /// From what outer diameter on a needle counts as thick: 18 G, m.
 const THICK_M: f64 = 1.27e-3;
 
-/// One term of a route's risk.
+/// One term of a needle path's risk.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RiskTerm {
     /// Its key under `[goals.route.odds]`.
     pub term: &'static str,
-    /// What of it the route has, from 0 to 1.
+    /// Share of it that the needle path has, from 0 to 1.
     pub share: f64,
     /// Its odds ratio where all of it is there.
     pub odds_ratio: f64,
@@ -24,19 +24,19 @@ pub struct RiskTerm {
     pub log_odds: f64,
 }
 
-/// The sum of all terms. It orders routes and is no probability.
+/// The sum of all terms. It ranks needle paths and is not a probability.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Risk {
     /// Sum of the terms.
     pub log_odds: f64,
-    /// The same as a ratio to a route without any of them.
+    /// The odds ratio relative to a needle path without any of them.
     pub odds_ratio: f64,
     /// All terms, also those that add nothing.
     pub terms: Vec<RiskTerm>,
 }
 
 impl Risk {
-    /// Of a route in a direction, with what it passes of lungs; `touches_pleura` is of the lesion, if it is in a lung.
+    /// Of a needle path in a direction, with its lung passage; `touches_pleura` is of the lesion, if it is in a lung.
     pub fn new(
         odds: &OddsSection,
         outwards: &UnitVector3<f64>,

@@ -1,45 +1,45 @@
-//! What a route has to keep.
+//! Rules that a needle path must satisfy.
 
 use needlebench_cell::Tool;
-use needlebench_cell::scenario::{NeedleRouteSection, OddsSection, RouteSection};
+use needlebench_scenario::scenario::{NeedleRouteSection, OddsSection, RouteSection};
 
 use crate::Obstacle;
 
-/// Why a direction is no route.
+/// Why a direction is not an admissible needle path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum RouteRule {
     /// The target is not in the body, or no skin is found.
     NoSkin,
-    /// It leaves the body where the scan or the phantom ends.
+    /// The scan or the phantom ends before the skin.
     End,
     /// The needle does not reach from the guide to the target.
     NeedleTooShort,
-    /// An arm, a fold or a marker is where guide and needle are.
+    /// An arm, a fold or a marker is in the way of guide and needle.
     Outside,
-    /// Too near to bone.
+    /// Too close to bone.
     Bone,
-    /// Too near to a vessel.
+    /// Too close to a vessel.
     Vessel,
-    /// Too near to an organ.
+    /// Too close to an organ.
     Organ,
-    /// Enters lungs too often.
+    /// Too many pleural crossings.
     Pleura,
     /// Crosses a fissure.
     Fissure,
     /// Crosses a bulla.
     Bulla,
-    /// Behind the target, where the needle's mechanism throws it, it is too near to something or leaves the lung.
+    /// Behind the target, within the needle's throw, it is too close to an obstacle or leaves the lung.
     Throw,
     /// Too oblique to the skin.
     Oblique,
-    /// Guide or entry would be in the table or in other things.
+    /// Guide or entry would be in the table or in another object.
     Blocked,
-    /// No configuration of the robot works there.
+    /// No configuration of the robot is feasible.
     Robot,
 }
 
 impl RouteRule {
-    /// All of them, in the order in which they are asked.
+    /// All of them, in the order of evaluation.
     pub const ALL: [Self; 14] = [
         Self::NoSkin,
         Self::End,
@@ -57,7 +57,7 @@ impl RouteRule {
         Self::Robot,
     ];
 
-    /// As JSON has it.
+    /// Name in JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::NoSkin => "no_skin",
@@ -81,19 +81,19 @@ impl RouteRule {
     pub fn in_words(self) -> &'static str {
         match self {
             Self::NoSkin => "no skin found",
-            Self::End => "skin is not known there",
+            Self::End => "scan or model ends before the skin",
             Self::NeedleTooShort => "needle too short",
             Self::Outside => "arm, fold or marker on the skin",
             Self::Oblique => "too oblique to the skin",
-            Self::Bone => "bone in the way",
-            Self::Vessel => "vessel in the way",
-            Self::Organ => "organ in the way",
-            Self::Pleura => "enters lungs too often",
+            Self::Bone => "too close to bone",
+            Self::Vessel => "too close to a vessel",
+            Self::Organ => "too close to an organ",
+            Self::Pleura => "too many pleural crossings",
             Self::Fissure => "crosses a fissure",
             Self::Bulla => "crosses a bulla",
-            Self::Throw => "throw of the needle not free",
-            Self::Blocked => "guide in table or other things",
-            Self::Robot => "no configuration of the robot works",
+            Self::Throw => "needle throw not free",
+            Self::Blocked => "guide in table or other object",
+            Self::Robot => "no feasible robot configuration",
         }
     }
 
@@ -106,7 +106,7 @@ impl RouteRule {
         }
     }
 
-    /// Whether its limit is the least that there has to be; else it is the most that there may be.
+    /// Whether its limit is a minimum; otherwise it is a maximum.
     pub fn is_least(self) -> bool {
         matches!(self, Self::Bone | Self::Vessel | Self::Organ | Self::Throw)
     }
@@ -121,18 +121,18 @@ impl RouteRule {
     }
 }
 
-/// A rule that a direction breaks.
+/// A rule that rejects a direction, with value and limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refusal {
     /// Which one.
     pub rule: RouteRule,
-    /// What it has, in the rule's unit.
+    /// Its value, in the rule's unit.
     pub value: f64,
-    /// What it may have at most, or has to have at least.
+    /// The limit: a minimum or a maximum.
     pub limit: f64,
 }
 
-/// The rules of a route, in SI.
+/// The rules of a needle path, in SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RouteRules {
     /// Least distance of the needle's surface from each obstacle without the robot's own error, m, in the order of
@@ -142,7 +142,7 @@ pub struct RouteRules {
     pub constant_m: f64,
     /// Standard deviations that are added to it.
     pub sigmas: f64,
-    /// What the scenario keeps from each obstacle in any case, m.
+    /// Clearance from each obstacle that the scenario requires in any case, m.
     pub floors_m: [f64; 3],
     /// Half the needle's thickness, m.
     pub needle_radius_m: f64,
@@ -152,24 +152,24 @@ pub struct RouteRules {
     pub outside_m: f64,
     /// Largest angle to the skin's normal, rad.
     pub max_skin_angle_rad: f64,
-    /// How often lungs may be entered.
+    /// Most pleural crossings allowed.
     pub max_pleural_crossings: u32,
     /// Whether fissures may be crossed.
     pub cross_fissures: bool,
     /// Whether bullae may be crossed.
     pub cross_bullae: bool,
-    /// What is needed free behind the target, m.
+    /// Free distance required behind the target, m.
     pub throw_m: f64,
     /// Odds ratios.
     pub odds: OddsSection,
 }
 
-/// The usual standard deviation of the tip where no robot tells its own, m (assumed; see `tip_sd_mm`).
+/// The default standard deviation of the tip without a robot, m (assumed; see `tip_sd_mm`).
 const USUAL_TIP_SD_M: f64 = 1e-3;
 
 impl RouteRules {
-    /// Of a scenario's sections and its tool; `standoff_m` is from the skin to the guide. Where no robot is asked its
-    /// error is assumed.
+    /// From a scenario's sections and its tool; `standoff_m` is from the skin to the guide. Without a robot, its error
+    /// is assumed.
     pub fn new(
         section: &RouteSection,
         run: &NeedleRouteSection,
@@ -201,7 +201,7 @@ impl RouteRules {
         rules
     }
 
-    /// Least distance from an obstacle, m, of a needle with an expected mean error and standard deviation across it, m.
+    /// Least distance from an obstacle, m, of a needle with this lateral bias and standard deviation, m.
     pub fn margin_m(&self, obstacle: Obstacle, bias_m: f64, tip_sd_m: f64) -> f64 {
         let wanted_m = self.constant_m + bias_m + self.sigmas * tip_sd_m;
         wanted_m.max(self.floors_m[obstacle as usize])

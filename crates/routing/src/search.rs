@@ -1,4 +1,4 @@
-//! Directions judged by all rules that need no robot.
+//! Directions evaluated by all rules that need no robot.
 
 use std::cmp::Ordering;
 
@@ -10,10 +10,10 @@ use crate::directions::{around, evenly};
 use crate::risk::Risk;
 use crate::rules::{Refusal, RouteRule, RouteRules};
 
-/// Neighbouring directions that one thread judges before it takes others.
+/// Neighbouring directions that one thread evaluates before it takes others.
 const TOGETHER: usize = 64;
 
-/// A direction that harms nothing, before the robot is asked.
+/// An admissible direction, before the robot is checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Route {
     /// From the target to the entry, frame `phantom`.
@@ -27,28 +27,28 @@ pub struct Route {
     pub spare_m: f64,
     /// Angle between the needle and the skin's normal, rad.
     pub skin_angle_rad: f64,
-    /// Lungs on the way.
+    /// Lungs along the path.
     pub lungs: LungPassage,
     /// How it compares.
     pub risk: Risk,
 }
 
 impl Route {
-    /// Of two routes the one of less risk first; of equals the one with more to spare.
+    /// Of two needle paths the one of less risk first; of equals the one with more margin.
     pub fn better_first(&self, other: &Self) -> Ordering {
         let risk = self.risk.log_odds.total_cmp(&other.risk.log_odds);
         risk.then(other.spare_m.total_cmp(&self.spare_m))
     }
 }
 
-/// A direction and what came of it.
+/// A direction and its evaluation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// From the target, frame `phantom`.
     pub outwards: UnitVector3<f64>,
     /// The skin in that direction, m from the target, if there is any.
     pub depth_m: Option<f64>,
-    /// A route, or the rule that it breaks.
+    /// A needle path, or the rule that rejects it.
     pub outcome: Result<Route, Refusal>,
 }
 
@@ -60,7 +60,7 @@ pub struct Searched {
 }
 
 impl Searched {
-    /// Those that are free, the best first.
+    /// The admissible ones, the best first.
     pub fn free(&self) -> Vec<&Route> {
         let mut free: Vec<&Route> = self
             .candidates
@@ -71,7 +71,7 @@ impl Searched {
         free
     }
 
-    /// How many directions each rule refuses, in the order of the rules; those that refuse none are left out.
+    /// How many directions each rule rejects, in the order of the rules; those that reject none are left out.
     pub fn refused(&self) -> Vec<(RouteRule, usize)> {
         let refusals = self.candidates.iter();
         let rules: Vec<RouteRule> = refusals
@@ -85,7 +85,7 @@ impl Searched {
     }
 }
 
-/// Judges so many directions, evenly over the sphere; the same on any number of threads. Asks between directions
+/// Evaluates so many directions, evenly over the sphere; the same on any number of threads. Checks between directions
 /// whether to stop, and then leaves the rest out.
 pub fn search(
     anatomy: &dyn Anatomy,
@@ -115,8 +115,8 @@ pub fn search(
     }
 }
 
-/// Indices of directions so that each stands beside its neighbours: rays that are close by look at the same voxels, which
-/// are in the cache then.
+/// Indices of directions so that each stands beside its neighbours: rays that are close by look at the same voxels,
+/// which are in the cache then.
 fn neighbours_together(directions: &[UnitVector3<f64>]) -> Vec<usize> {
     /// Bands from pole to pole: some 3 deg wide.
     const BANDS: f64 = 60.0;
@@ -136,7 +136,7 @@ fn neighbours_together(directions: &[UnitVector3<f64>]) -> Vec<usize> {
     keyed.into_iter().map(|(.., index)| index).collect()
 }
 
-/// Judges one direction.
+/// Evaluates one direction.
 pub fn judge(anatomy: &dyn Anatomy, rules: &RouteRules, outwards: &UnitVector3<f64>) -> Candidate {
     let ray = Ray {
         target: anatomy.target(),
@@ -234,7 +234,7 @@ fn throw(anatomy: &dyn Anatomy, rules: &RouteRules, ray: &Ray) -> Result<[f64; 3
     }
 }
 
-/// The margin that is missed most.
+/// The margin with the largest shortfall.
 fn worst(rules: &RouteRules, distances_m: &[f64; 3]) -> Option<(Obstacle, f64, f64)> {
     Obstacle::ALL
         .into_iter()
@@ -253,7 +253,7 @@ fn spare_m(rules: &RouteRules, distances_m: &[f64; 3]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The best route near one: in steps that become smaller, from ring to ring, to what is better first.
+/// The best needle path near one: in decreasing steps, from ring to ring, to the first better one.
 pub fn refined(
     anatomy: &dyn Anatomy,
     rules: &RouteRules,

@@ -1,10 +1,10 @@
 //! The solids of a phantom as anatomy.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use needlebench_cell::phantom::{Phantom, PhantomPart, RouteObstacle, Tissue};
-use needlebench_cell::scenario::NeedleRouteSection;
 use needlebench_geometry::mesh::SurfaceIndex;
 use needlebench_kinematics::Pose;
+use needlebench_phantom::{Phantom, PhantomPart, RouteObstacle, Tissue};
+use needlebench_scenario::scenario::NeedleRouteSection;
 
 use crate::anatomy::{
     Anatomy, Exit, LungPassage, Nearest, Obstacle, Ray, angle_rad, is_marker_near,

@@ -400,8 +400,8 @@ fn inverse_scaled<const N: usize>(information: &SMatrix<f64, N, N>) -> Option<SM
 
 #[cfg(test)]
 mod tests {
-    use needlebench_kinematics::random::SplitMix64;
     use needlebench_kinematics::{UrModel, pose_from_rotation_vector, rotation_vector};
+    use needlebench_numerics::random::SplitMix64;
 
     use super::*;
 

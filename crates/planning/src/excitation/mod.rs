@@ -1,15 +1,18 @@
-//! A run that excites every joint: its motions, their proven clearances, the search for its postures, and what
-//! can be identified from its log.
+//! An excitation run: its motions, their certified clearances, the search for its postures, and what can be identified
+//! from its log.
 
 mod information;
 mod search;
 
-use needlebench_cell::excitation::ExcitationProtocol;
-use needlebench_cell::{Cell, ClearanceClass, ResolvedScenario};
+use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::{CertificateOptions, ClearanceModel, MotionCertificate, certify};
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase};
 use needlebench_kinematics::{JOINT_LABELS, Joints};
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::excitation::ExcitationProtocol;
 use std::borrow::Cow;
+
+use crate::rejection::distance_in_words;
 
 pub use information::{
     CalibrationInformation, IDENTIFIED_SHARE, Identification, JointInformation, NOISE, Noise,
@@ -63,7 +66,7 @@ impl Aim {
     }
 }
 
-/// One straight joint motion and the stand after it.
+/// One joint-space line and the stand after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
     /// What it leads to.
@@ -82,7 +85,7 @@ pub struct Leg {
     pub stand_s: f64,
 }
 
-/// A motion with its proven clearances.
+/// A motion with its certified clearances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CertifiedMotion {
     /// Which: a sweep once for all its speeds and both ways, since the path is the same.
@@ -109,7 +112,8 @@ pub struct ExcitationPlan {
 pub enum ExcitationError {
     /// A motion comes nearer to something than the section allows.
     #[error(
-        "{motion}: {a} comes within {distance_mm:.1} mm of {b} (limit {limit_mm:.1} mm, proven {proven_mm:.1} mm)"
+        "{motion}: {} (certified {proven_mm:.1} mm), clearance {limit_mm:.1} mm required",
+        distance_in_words(.a, .b, *.distance_mm)
     )]
     Clearance {
         /// The motion.
@@ -122,7 +126,7 @@ pub enum ExcitationError {
         b: String,
         /// Their least distance that was found, mm; negative inside.
         distance_mm: f64,
-        /// Lower bound that is proven, mm.
+        /// Certified lower bound, mm.
         proven_mm: f64,
         /// Least that is allowed, mm.
         limit_mm: f64,
@@ -132,8 +136,8 @@ pub enum ExcitationError {
 impl ExcitationError {
     /// How the scenario can be mended.
     pub fn hint(&self) -> &'static str {
-        "change, reorder or leave out the posture, lower `clearance_mm` or `self_clearance_mm`, or let \
-         `needlebench record-plan` find postures"
+        "change, reorder or remove the posture, lower `clearance_mm` or `self_clearance_mm`, or \
+         plan postures with `needlebench record-plan`"
     }
 
     /// The key that it is about.
@@ -147,7 +151,7 @@ impl ExcitationError {
     }
 }
 
-/// Least clearance of a class that a run has to keep, m.
+/// Required clearance of a class in a run, m.
 pub fn least_m(protocol: &ExcitationProtocol, class: ClearanceClass) -> f64 {
     match class {
         ClearanceClass::SelfCollision => protocol.self_clearance_m,
@@ -159,7 +163,7 @@ pub fn least_m(protocol: &ExcitationProtocol, class: ClearanceClass) -> f64 {
 /// Plans and certifies the run of a scenario.
 ///
 /// # Errors
-/// The first motion whose clearance is not proven to be what the section asks for.
+/// The first motion whose certified clearance is below the required one.
 pub fn plan_excitation(
     resolved: &ResolvedScenario,
     protocol: &ExcitationProtocol,
@@ -198,8 +202,8 @@ pub fn plan_excitation(
     })
 }
 
-/// The proven clearances of the straight joint motion between two postures. They are of the path: whatever the
-/// speed along it, they hold.
+/// The certified clearances of the joint-space line between two postures. They are those of the path, at any speed
+/// along it.
 fn certified(
     model: &ClearanceModel,
     from: &Joints,

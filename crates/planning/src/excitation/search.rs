@@ -10,19 +10,22 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix2, Vector2};
-use needlebench_cell::excitation::{ExcitationProtocol, Load, Sweep};
-use needlebench_cell::{ClearanceClass, ResolvedScenario};
+use needlebench_cell::ClearanceClass;
 use needlebench_clearance::{ClearanceModel, Nearby, PairClearance};
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Body, Dynamics, JOINT_COUNT, JOINT_LABELS, Joints};
+use needlebench_numerics::order::upper_median;
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::excitation::{ExcitationProtocol, Load, Sweep};
 
 use super::information::{Calibration, CalibrationInformation, Identification};
 use super::{Leg, least_m, legs};
 use crate::limits::{ByClass, ClassLimits};
 use crate::motion::MotionChecker;
+use crate::rejection::distance_in_words;
 
-/// What postures are asked to keep beyond the limits, m. Assumed: above what a factory calibration moves the flange
-/// by, what tracking adds, and what lies between two looks at a motion.
+/// Reserve of postures beyond the limits, m. Assumed: above what a factory calibration moves the flange by, what
+/// tracking adds, and what lies between two looks at a motion.
 const RESERVE_M: f64 = 3e-3;
 
 /// Candidates that are enough to choose from.
@@ -54,14 +57,14 @@ const SWEEPS_RAD: [f64; 3] = [1.05, 0.785, 0.524];
 /// Exchanges of one chosen posture for a better one, over all of them, at most.
 const EXCHANGES: usize = 6;
 
-/// Postures at which a calibration is judged.
+/// Postures at which a calibration is evaluated.
 const ELSEWHERE: usize = 200;
 
 /// Runs with random postures that a run is compared with.
 const RANDOM_RUNS: u64 = 9;
 
-/// Standard deviation of a torque about its law that spreads of gravity are held against, N m. Assumed: a
-/// wrist's friction.
+/// Standard deviation of a torque about its law that spreads of gravity are compared with, N m. Assumed: a wrist's
+/// friction.
 const GRAVITY_NOISE_NM: f64 = 0.5;
 
 /// How to search.
@@ -96,7 +99,8 @@ pub struct FoundRun {
 pub enum SearchError {
     /// The start posture is too near to something.
     #[error(
-        "the start posture keeps {distance_mm:.1} mm between {a} and {b}, less than the {least_mm:.1} mm that are asked for with a reserve of 3 mm"
+        "in the start posture, {}, clearance {least_mm:.1} mm required (including a reserve of 3 mm)",
+        distance_in_words(.a, .b, *.distance_mm)
     )]
     Start {
         /// One solid.
@@ -105,12 +109,13 @@ pub enum SearchError {
         b: String,
         /// Their distance, mm.
         distance_mm: f64,
-        /// What is asked for, reserve included, mm.
+        /// The required clearance, reserve included, mm.
         least_mm: f64,
     },
     /// Too few postures keep the clearances.
     #[error(
-        "of {drawn} postures {free} keep the clearances, also on the way from the start posture: too few for a run of {wanted}"
+        "{free} of {drawn} sampled postures satisfy the clearances, including the motion from the \
+         start posture: too few for a run of {wanted}"
     )]
     Postures {
         /// Postures that were drawn.
@@ -121,7 +126,7 @@ pub enum SearchError {
         wanted: usize,
     },
     /// A joint has no room to sweep.
-    #[error("{joint} finds no room for a sweep of {by_deg:.0} deg at any posture")]
+    #[error("no posture has space for a sweep of {joint} by {by_deg:.0} deg")]
     Sweep {
         /// The joint's label.
         joint: &'static str,
@@ -450,7 +455,7 @@ impl<'a> Search<'a> {
     }
 
     fn constants(&self) -> Option<&[f64; JOINT_COUNT]> {
-        let used = self.resolved.cell.robot.arm.as_ref()?;
+        let used = self.resolved.robot_description.arm.as_ref()?;
         let motors = used.arm.data.motors.as_ref()?;
         Some(&motors.torque_constant_nm_a)
     }
@@ -502,27 +507,25 @@ impl<'a> Search<'a> {
             })
             .collect();
         let of_calibration = |value: fn(&CalibrationInformation) -> f64| {
-            median(runs.iter().map(|(found, _)| value(found)).collect())
+            median(runs.iter().map(|(found, _)| value(found)))
         };
         let mut typical = runs[0].1.clone();
-        let of_payload = |value: fn(&Identification) -> f64| {
-            median(runs.iter().map(|(_, found)| value(found)).collect())
-        };
+        let of_payload =
+            |value: fn(&Identification) -> f64| median(runs.iter().map(|(_, found)| value(found)));
         typical.payload.mass_kg = of_payload(|found| found.payload.mass_kg);
         typical.payload.centre_m = of_payload(|found| found.payload.centre_m);
         for joint in 0..JOINT_COUNT {
             let all = || runs.iter().map(|(_, found)| &found.joints[joint]);
             let of = |value: fn(&super::JointInformation) -> Option<f64>| {
                 let known: Option<Vec<f64>> = all().map(value).collect();
-                known.map(median)
+                known.map(|values| median(values.into_iter()))
             };
             let each = &mut typical.joints[joint];
-            each.rotor_kgm2 = median(all().map(|found| found.rotor_kgm2).collect());
+            each.rotor_kgm2 = median(all().map(|found| found.rotor_kgm2));
             each.torque_constant_share = of(|found| found.torque_constant_share);
             each.coulomb_nm = of(|found| found.coulomb_nm);
             each.viscous_nms_rad = of(|found| found.viscous_nms_rad);
-            each.gravity_nm =
-                [0, 1].map(|end| median(all().map(|found| found.gravity_nm[end]).collect()));
+            each.gravity_nm = [0, 1].map(|end| median(all().map(|found| found.gravity_nm[end])));
         }
         let condition = of_calibration(|found| found.condition.unwrap_or(f64::INFINITY));
         let calibration = CalibrationInformation {
@@ -534,9 +537,9 @@ impl<'a> Search<'a> {
     }
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+/// Median; of an even number the upper middle value.
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    upper_median(&mut values.collect::<Vec<_>>())
 }
 
 /// The candidate that tells most beyond what is known, of those that are not chosen.

@@ -1,10 +1,11 @@
 //! What the best member of a family is best at.
 
 use nalgebra::Point3;
-use needlebench_cell::scenario::RollAim;
-use needlebench_cell::{ClearanceClass, Goal};
+use needlebench_cell::ClearanceClass;
 use needlebench_clearance::AIMS;
 use needlebench_kinematics::Joints;
+use needlebench_scenario::Goal;
+use needlebench_scenario::scenario::RollAim;
 
 use super::Member;
 use crate::limits::ByClass;
@@ -46,8 +47,8 @@ pub(super) struct Valued<'v> {
 }
 
 impl Planner<'_> {
-    /// How good a posture is at an aim; more is better. Of postures that work or do not work alike:
-    /// it does not look at rules.
+    /// How good a posture is at an aim; more is better. It does not evaluate rules, so it applies to feasible and
+    /// infeasible postures alike.
     pub fn value(&self, goal: &Goal, aim: Aim, candidate: &Candidate) -> f64 {
         self.value_of(
             goal,

@@ -2,34 +2,36 @@
 //!
 //! Turning the guide about the needle changes nothing for the needle, so each of the eight
 //! configurations is a one-parameter family of postures. Its members are looked at one by one, on a
-//! grid of rolls; between the grid's rolls the edges of the ranges that work are bisected and the
-//! best member is searched for.
+//! grid of rolls; between the grid's rolls the edges of the feasible ranges are bisected and the best
+//! member is searched for.
 //!
 //! # What a sweep can miss
 //!
-//! A member works where its [`surplus`](Member::surplus) is not negative. The surplus is a
-//! continuous function of roll as long as the branch exists, so between a roll that works and one
-//! that does not there is an edge, and bisection finds it. A range, or a gap, that begins and ends
-//! between two neighbouring rolls of the grid shows only as a local maximum or minimum of the
-//! surplus; where a parabola through the three rolls next to one comes near to zero, it is searched
-//! for. One that is narrower still and steeper than that is missed: a finer grid finds it.
+//! A member is feasible where its constraint margin, [`surplus`](Member::surplus), is not negative. The constraint
+//! margin is a continuous function of roll as long as the branch exists, so between a feasible and an infeasible roll
+//! there is an edge, and bisection finds it. A range, or a gap, that begins and ends between two neighbouring rolls of
+//! the grid shows only as a local maximum or minimum of the constraint margin; where a parabola through the three rolls
+//! next to one comes near to zero, it is searched for. One that is narrower still and steeper than that is missed: a
+//! finer grid finds it.
 
 mod aim;
 mod ranges;
 
 use std::f64::consts::TAU;
 
-use needlebench_cell::{ClearanceClass, Goal};
+use needlebench_cell::ClearanceClass;
 use needlebench_clearance::{AIMS, Counts, Nearby};
 use needlebench_kinematics::ik::{Configuration, Solution, Solutions, wrap_angle};
+use needlebench_scenario::Goal;
 
 pub use aim::Aim;
 use aim::{BALANCED, Valued, balanced_group};
 pub use ranges::{Best, EDGE_RAD, Edge, Family, RollRange};
 
+use crate::Rejection;
 use crate::limits::{ByClass, CLASS_COUNT, Shortfall};
 use crate::planner::{Candidate, Planner, PostureMargins, absent};
-use crate::{Rejection, Rule};
+use needlebench_cell::Rule;
 
 /// One configuration at one angle of the guide about the needle.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,9 +40,9 @@ pub struct Member {
     pub roll_rad: f64,
     /// The posture; `None` where the configuration does not reach the pose.
     pub candidate: Option<Candidate>,
-    /// Rules that the posture breaks, first failing one first; empty if it works.
+    /// Rules that the posture violates, first failing one first; empty if it is feasible.
     pub rejections: Vec<Rejection>,
-    /// Distance from breaking a rule, or how far the worst broken one is broken (negative): metres
+    /// Constraint margin: distance from violating a rule, or by how much the worst one is violated (negative): metres
     /// for clearances and reach, a tenth of a metre per unit for sines and radians.
     pub surplus: f64,
 }
@@ -84,16 +86,16 @@ impl Merit {
 /// wrist.
 const METRES_PER_UNIT: f64 = 0.1;
 
-/// Surplus of a configuration that is the same posture as another: it is at most at single rolls.
+/// Constraint margin of a configuration that is the same posture as another: it is at most at single rolls.
 const MERGED_SURPLUS: f64 = -1e-12;
 
 impl Member {
-    /// The posture breaks no rule.
+    /// The posture violates no rule.
     pub fn works(&self) -> bool {
         self.rejections.is_empty()
     }
 
-    /// The same where the needle's route is refused: the first rule that it breaks.
+    /// The same where the needle path is rejected: the first rule that it violates.
     #[must_use]
     pub fn on_route(mut self, refused: Option<&Rejection>) -> Self {
         if let Some(route) = refused {
@@ -109,7 +111,7 @@ impl Member {
 pub(crate) struct Glance {
     /// The configuration reaches the pose.
     pub exists: bool,
-    /// It breaks no rule.
+    /// It violates no rule.
     pub works: bool,
     /// [`Member::surplus`], of one that exists; else negative infinity.
     pub surplus: f64,
@@ -119,7 +121,7 @@ pub(crate) struct Glance {
     pub merit: Merit,
 }
 
-/// What clearances have to keep.
+/// The required clearances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Level {
     /// Not to be rejected.
@@ -135,7 +137,7 @@ pub(crate) enum Level {
 enum Asked {
     /// Its merit for an aim.
     Merit(Aim),
-    /// How far it is from breaking a rule if clearances had to keep a level.
+    /// How far it is from violating a rule if clearances had to keep a level.
     Surplus(Level),
 }
 
@@ -179,7 +181,7 @@ impl<'p> Sweep<'p> {
         self.look(Asked::Merit(aim), roll_rad)
     }
 
-    /// Surplus of the member at a roll if clearances had to keep a level, and whether it keeps that.
+    /// Constraint margin of the member at a roll if clearances had to keep a level, and whether it keeps that.
     pub fn keeps(&mut self, level: Level, roll_rad: f64) -> Glance {
         self.look(Asked::Surplus(level), roll_rad)
     }
@@ -213,7 +215,7 @@ impl<'p> Sweep<'p> {
         }
     }
 
-    /// Surplus of the member at a roll, and whether it works.
+    /// Constraint margin of the member at a roll, and whether it is feasible.
     pub fn surplus(&mut self, roll_rad: f64) -> (f64, bool) {
         let seen = self.keeps(Level::Floor, roll_rad);
         if seen.exists {
@@ -291,7 +293,7 @@ impl<'p> Sweep<'p> {
         self.solution(roll_rad).is_some()
     }
 
-    /// Whether the member at a roll works.
+    /// Whether the member at a roll is feasible.
     pub fn works(&mut self, roll_rad: f64) -> bool {
         let found = self.solution(roll_rad);
         found.is_some_and(|solution| self.planner.works(&solution, &mut self.nearby))
@@ -313,8 +315,7 @@ fn missing(roll_rad: f64, configuration: Configuration, found: &Solutions) -> Me
     }
 }
 
-/// Of members without a posture the one that comes nearest, which says most, with the rule that it
-/// breaks.
+/// Of members without a posture the one that comes nearest, which says most, with the rule that it violates.
 pub(crate) fn nearest_missing(grid: Vec<Member>) -> Member {
     let missing = |member: &Member| {
         let values = member.rejections.iter().map(|rejection| rejection.value);
@@ -436,8 +437,8 @@ impl Planner<'_> {
         ]
     }
 
-    /// How good a posture is: first how little it falls short of the clearances that will be judged, then
-    /// of the reserve, from singularities too, and then by the aim. The order is that of preference.
+    /// How good a posture is: first how little it falls short of the clearances that will be evaluated, then of the
+    /// reserve, from singularities too, and then by the aim. The order is that of preference.
     pub fn merit(&self, goal: &Goal, aim: Aim, candidate: &Candidate) -> Merit {
         let posture = Valued {
             joints: &candidate.joints,
@@ -461,7 +462,7 @@ impl Planner<'_> {
         }
     }
 
-    /// Least distance of a posture from breaking a rule.
+    /// Least distance of a posture from violating a rule.
     ///
     /// Of `rejections` those for its joint limits and for what it misses count: the others say what
     /// the candidate's own numbers say.
@@ -496,9 +497,9 @@ impl Planner<'_> {
 mod tests {
     use std::path::Path;
 
-    use needlebench_cell::{Overrides, load_scenario};
     use needlebench_clearance::ClearanceModel;
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
+    use needlebench_scenario::{Overrides, load_scenario};
 
     use super::*;
 

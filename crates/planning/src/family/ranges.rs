@@ -1,10 +1,10 @@
-//! Connected ranges of roll in which a configuration works, and the best roll of each.
+//! Connected ranges of roll in which a configuration is feasible, and the best roll of each.
 
 use std::f64::consts::TAU;
 
-use needlebench_cell::Goal;
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
+use needlebench_scenario::Goal;
 
 use super::{Aim, Glance, Level, Member, Merit, Sweep, nearest_missing};
 use crate::Rejection;
@@ -16,7 +16,7 @@ use crate::planner::Planner;
 pub struct Edge {
     /// First roll found outside, at most [`EDGE_RAD`] from the last one inside, rad.
     pub roll_rad: f64,
-    /// The first rule that is broken there.
+    /// The first rule that is violated there.
     pub rejection: Rejection,
 }
 
@@ -27,14 +27,14 @@ pub struct Best {
     pub aim: Aim,
     /// Its value ([`Planner::value`]).
     pub value: f64,
-    /// The member; it works.
+    /// The member; it is feasible.
     pub member: Member,
 }
 
-/// Rolls in a row at which a configuration works.
+/// Consecutive rolls at which a configuration is feasible.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RollRange {
-    /// First roll that works, rad, in `[0, 2 pi)`.
+    /// First feasible roll, rad, in `[0, 2 pi)`.
     pub from_rad: f64,
     /// Last one, rad; not below the first, and above `2 pi` where the range runs through zero.
     pub to_rad: f64,
@@ -49,8 +49,8 @@ pub struct RollRange {
     /// How far each joint turns on the way from one end to the other, largest position less
     /// smallest, rad.
     pub joint_span_rad: Joints,
-    /// The guide can be turned from one end to the other without leaving the joint ranges, with the
-    /// right whole turns at the start.
+    /// The guide can be turned from one end to the other without leaving the joint ranges, with the right 2π
+    /// equivalents at the start.
     pub fits_joint_limits: bool,
 }
 
@@ -78,7 +78,7 @@ impl RollRange {
 pub struct Family {
     /// Which of the eight.
     pub configuration: Configuration,
-    /// Ranges that work, from roll zero upwards.
+    /// Feasible ranges, from roll zero upwards.
     pub ranges: Vec<RollRange>,
 }
 
@@ -88,8 +88,8 @@ pub const EDGE_RAD: f64 = 1.745e-4;
 const REFINED: f64 = 1.0 / 64.0;
 /// Half the width of the widest range that may be missed where nothing on the grid keeps what is wanted, rad.
 const SCAN_RAD: f64 = 2.5e-3;
-/// A local extreme of the surplus is searched where it is nearer to zero than this many times the
-/// rise to its neighbours.
+/// A local extreme of the constraint margin is searched where it is nearer to zero than this many times the rise to its
+/// neighbours.
 const CLOSER_LOOK: f64 = 2.0;
 
 /// A roll that was looked at.
@@ -110,7 +110,7 @@ impl Knot {
     }
 }
 
-/// Rolls in a row that work: the number of the first one, and how many there are.
+/// Neighbouring feasible rolls: the number of the first one, and how many there are.
 type Stretch = (usize, usize);
 
 impl Planner<'_> {
@@ -238,11 +238,11 @@ impl Planner<'_> {
         }
     }
 
-    /// The member of a configuration that is best for an aim among those that work, else the one on the grid
-    /// of rolls that comes nearest to working.
+    /// The feasible member of a configuration that is best for an aim, else the one on the grid of rolls with the
+    /// largest constraint margin.
     ///
-    /// Where nothing on the grid keeps what is wanted, what lies between its rolls is looked at too
-    /// ([`scan`]): a configuration fails, or lacks the reserve, where all rolls do.
+    /// Where no member on the grid has the required clearances with their reserve, the rolls between are examined too
+    /// ([`scan`]): a configuration is infeasible, or lacks the reserve, only where all rolls are or do.
     pub(crate) fn best_member(
         &self,
         goal: &Goal,
@@ -318,7 +318,7 @@ impl Seen {
     }
 }
 
-/// The best of all stretches that work on a circle of rolls in ascending order; of equal ones the first.
+/// The best of all feasible stretches on a circle of rolls in ascending order; of equal ones the first.
 fn highest_of_circle(sweep: &mut Sweep<'_>, aim: Aim, all: &[Seen]) -> Option<Peak> {
     let count = all.len();
     let works: Vec<bool> = all.iter().map(|seen| seen.glance.works).collect();
@@ -453,7 +453,7 @@ fn highest(
     most
 }
 
-/// Rolls between those of the grid where the surplus changes its sign twice.
+/// Rolls between those of the grid where the constraint margin changes its sign twice.
 fn closer_look(grid: &[Knot], sweep: &mut Sweep<'_>) -> Vec<f64> {
     let count = grid.len();
     let step_rad = TAU / count as f64;
@@ -548,7 +548,7 @@ fn bisect(inside_rad: f64, outside_rad: f64, sweep: &mut Sweep<'_>) -> (f64, f64
     (good_rad, bad_rad)
 }
 
-/// Last member that works before an edge, if it is not `inside` itself, and the edge.
+/// Last feasible member before an edge, if it is not `inside` itself, and the edge.
 fn edge(inside: &Member, outside: &Member, sweep: &mut Sweep<'_>) -> (Option<Member>, Edge) {
     let (good_rad, bad_rad) = bisect(inside.roll_rad, outside.roll_rad, sweep);
     let mut at = |roll_rad: f64, known: &Member| {
@@ -572,7 +572,7 @@ fn edge(inside: &Member, outside: &Member, sweep: &mut Sweep<'_>) -> (Option<Mem
     (last, edge)
 }
 
-/// Smallest and largest position of each joint along some members, without jumps by whole turns, rad.
+/// Smallest and largest position of each joint along some members, without jumps by full revolutions, rad.
 fn joint_extent(members: &[Member]) -> (Joints, Joints) {
     let mut joints = members
         .iter()

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use needlebench_cell::{Overrides, ResolvedScenario, load_scenario, resolve_scenario};
+use needlebench_cell::Rule;
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::JOINT_COUNT;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
-use needlebench_planning::{GoalPlan, Planner, Rule};
+use needlebench_planning::{GoalPlan, Planner};
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario, resolve_scenario};
 
 /// Limits are compared at samples of a path; between two of them a joint may exceed its own by this
 /// much, relatively.
@@ -173,10 +174,10 @@ fn a_search_that_ends_without_a_motion_says_so() {
         .expect("forty postures are too few for one of them");
     let rejection = &found.rejections[0];
     assert!(
-        rejection.detail.contains("no way around was found"),
+        rejection.detail.contains("no alternative path found"),
         "{rejection:?}"
     );
-    assert!(rejection.detail.contains("on the straight one"));
+    assert!(rejection.detail.contains("on the joint-space line"));
     // Each of the searches stops once the budget is used up; one more straight way may be looked at.
     let effort = found.search.expect("it was searched");
     assert!(effort.checks < 400, "{effort:?}");

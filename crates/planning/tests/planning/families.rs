@@ -3,10 +3,11 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use needlebench_cell::{Goal, Overrides, ResolvedScenario, load_scenario, resolve_scenario};
+use needlebench_cell::Rule;
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_planning::{Aim, EDGE_RAD, Family, Planner, RollRange, Rule, Shortfall};
+use needlebench_planning::{Aim, EDGE_RAD, Family, Planner, RollRange, Shortfall};
+use needlebench_scenario::{Goal, Overrides, ResolvedScenario, load_scenario, resolve_scenario};
 
 /// Spacing of the brute force: 0.2 degrees.
 const FINE: u32 = 1800;

@@ -3,15 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use needlebench_cell::{
-    BodyKind, ClearanceClass, Overrides, ResolvedScenario, Roll, resolve_scenario,
-};
+use needlebench_cell::{BodyKind, ClearanceClass, Rule};
 use needlebench_clearance::{ClearanceModel, MotionCertificate};
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
-use needlebench_planning::{
-    ByClass, ConfigurationPlan, LimitedBy, Planner, Rule, SearchEnd, Shortfall,
-};
+use needlebench_numerics::random::SplitMix64;
+use needlebench_planning::{ByClass, ConfigurationPlan, LimitedBy, Planner, SearchEnd, Shortfall};
+use needlebench_scenario::{Overrides, ResolvedScenario, Roll, resolve_scenario};
 
 /// Two seeds may differ by this much in what a motion keeps, m.
 const SEEDS_AGREE_M: f64 = 5e-4;

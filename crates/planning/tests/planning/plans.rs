@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use needlebench_cell::{Overrides, ResolvedScenario, load_scenario, resolve_scenario};
+use needlebench_cell::Rule;
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::Phase;
-use needlebench_planning::{GoalPlan, Planner, Rule};
+use needlebench_planning::{GoalPlan, Planner};
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario, resolve_scenario};
 
 /// The figure for inverse kinematics: m and rad.
 const IK_RESIDUAL: f64 = 1e-12;

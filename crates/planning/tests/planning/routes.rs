@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use nalgebra::Point3;
-use needlebench_cell::phantom::Tissue;
-use needlebench_cell::{Overrides, ResolvedScenario, resolve_scenario};
+use needlebench_cell::Rule;
 use needlebench_clearance::ClearanceModel;
 use needlebench_geometry::{PreparedShape, Shape, separation};
 use needlebench_kinematics::Pose;
-use needlebench_planning::{Planner, Rule, crossed_fissures, judge_route, route_rejection};
+use needlebench_phantom::Tissue;
+use needlebench_planning::{Planner, crossed_fissures, judge_route, route_rejection};
+use needlebench_scenario::{Overrides, ResolvedScenario, resolve_scenario};
 
 /// A needle from a direction to the lesion at the right pleura, with more under `[planning]`.
 fn from_direction(azimuth_deg: f64, elevation_deg: f64, needle_route: &str) -> ResolvedScenario {

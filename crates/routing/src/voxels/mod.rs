@@ -9,11 +9,11 @@ mod rays;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::scenario::NeedleRouteSection;
 use needlebench_imaging::{
     Components, Connectivity, DistanceField, DistanceOptions, ImagingError, IndexBox, LabelMap,
     Mask, Remark, VoxelGrid, opened, structure_of,
 };
+use needlebench_scenario::scenario::NeedleRouteSection;
 
 use crate::anatomy::Obstacle;
 use blocks::Blocks;
@@ -124,7 +124,7 @@ impl VoxelAnatomy {
         let at = grid.index_from_ct(&(target + origin_in_ct_m));
         let centre = voxel_at(&at, grid.size()).ok_or_else(|| {
             ImagingError::refused("the target is outside the scan")
-                .hint("places are in mm of the scan (left, posterior, superior)")
+                .hint("coordinates are in mm in the scan's frame (left, posterior, superior)")
         })?;
         let reach_m = options.needle_m + options.outside_m;
         let reach = [0, 1, 2].map(|axis| steps(reach_m / spacing_m[axis]) + 2);
@@ -167,21 +167,21 @@ impl VoxelAnatomy {
         };
         if anatomy.kind_at(centre) == Kind::Outside {
             return Err(ImagingError::refused("the target is outside the body")
-                .hint("places are in mm of the scan (left, posterior, superior)"));
+                .hint("coordinates are in mm in the scan's frame (left, posterior, superior)"));
         }
         anatomy.look_over(labels);
         anatomy.find_lung(centre);
         anatomy.mark_mediastinum(labels, centre, options.off);
         if anatomy.target_lung.is_none() {
             anatomy.remarks.push(Remark::new(
-                "the target is in no lung: needles keep clear of both lungs",
+                "the target is not in a lung: needle paths avoid both lungs",
             ));
         }
         anatomy.make_fields(options)?;
         Ok(anatomy)
     }
 
-    /// What is worth knowing of how the labels were taken.
+    /// Remarks on the interpretation of the labels.
     pub fn remarks(&self) -> &[Remark] {
         &self.remarks
     }
@@ -235,7 +235,7 @@ impl VoxelAnatomy {
         }
     }
 
-    /// What the label map has, and what it has not and a user has to know of.
+    /// Structures that the label map has, and missing ones that a user must know of.
     fn look_over(&mut self, labels: &LabelMap) {
         let mut seen = vec![false; 1 << 16];
         for &label in &labels.labels {
@@ -259,26 +259,26 @@ impl VoxelAnatomy {
         }
         if !unknown.is_empty() {
             self.remarks.push(Remark::new(format!(
-                "taken for soft tissue, through which needles may go, since nothing is known of structures of these names: {}",
+                "unknown structures are treated as soft tissue, which needle paths may cross: {}",
                 unknown.join(", ")
             )));
         }
         if !missing.is_empty() {
             self.remarks.push(Remark::new(format!(
-                "the label map has no {}: nothing keeps needles out of these but the space between the lungs, where both \
-                 lungs are labelled; give a label map that has them (`ct build --labels`)",
+                "the label map has no {}: needle paths avoid them only in the mediastinum, if both lungs are labelled; \
+                 provide a label map that has them (`ct build --labels`)",
                 missing.join(", ")
             )));
         }
         if !self.knows[Obstacle::Bone as usize] {
             self.remarks.push(Remark::new(
-                "the label map has no bone: nothing is known of distances from it",
+                "the label map has no bone: distances to bone are unknown",
             ));
         }
     }
 
-    /// Makes an organ of the soft tissue between the lungs: heart and large vessels, seen or not. A target that is in it
-    /// has to be reached through it.
+    /// Makes an organ of the soft tissue between the lungs: heart and large vessels, labelled or not. A target in it
+    /// must be reached through it.
     fn mark_mediastinum(&mut self, labels: &LabelMap, centre: [usize; 3], off: &[String]) {
         const NAME: &str = NeedleRouteSection::MEDIASTINUM;
         if off.iter().any(|name| name == NAME) {
@@ -286,14 +286,13 @@ impl VoxelAnatomy {
         }
         let Some(between) = Mediastinum::of(labels, &self.classes, &self.within) else {
             self.remarks.push(Remark::new(
-                "the label map has not both lungs: the space between them, with heart and large vessels, is not known",
+                "the label map does not have both lungs: the mediastinum between them, with heart and large vessels, is unknown",
             ));
             return;
         };
         if self.target_lung.is_none() && between.contains(centre) {
             self.remarks.push(Remark::new(
-                "the target is between the lungs: needles may go through the soft tissue there, and keep clear of what has \
-                 a label of its own",
+                "the target is in the mediastinum: needle paths may cross its soft tissue and avoid labelled structures",
             ));
             return;
         }

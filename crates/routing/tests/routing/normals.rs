@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_imaging::{LabelMap, VoxelGrid};
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use needlebench_routing::body_normal;
 
 const RADIUS_M: f64 = 0.12;

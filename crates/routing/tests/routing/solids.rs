@@ -1,9 +1,9 @@
 //! Routes among a phantom's solids, against its parts point by point.
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::phantom::{Phantom, PhantomPart, Tissue};
-use needlebench_cell::scenario::{NeedleRouteSection, OddsSection};
+use needlebench_phantom::{Phantom, PhantomPart, Tissue};
 use needlebench_routing::{Obstacle, Ray, RouteRule, RouteRules, SolidAnatomy, search};
+use needlebench_scenario::scenario::{NeedleRouteSection, OddsSection};
 
 fn rules() -> RouteRules {
     RouteRules {
