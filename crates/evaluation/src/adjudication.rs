@@ -1,9 +1,11 @@
-//! When the engines differ by more than they may: what, when, who is nearer to the truth, and why.
+//! Discrepancy analysis, where the engines differ by more than the envelope allows: in which quantity, when, which
+//! engine is nearer to the reference solution, and why.
 
-use needlebench_cell::envelope::EnvelopeSection;
-use needlebench_cell::{Cell, Goal};
+use needlebench_cell::Cell;
 use needlebench_engine::{PlantState, Recording};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
+use needlebench_scenario::Goal;
+use needlebench_scenario::envelope::EnvelopeSection;
 use serde::Serialize;
 
 use crate::engine_pairs::pairs;
@@ -20,11 +22,11 @@ const SHRINKS_WITH_STEP: f64 = 0.75;
 /// Contacts that begin this many steps apart are no longer one and the same event.
 const ONSET_STEPS: f64 = 1.5;
 
-/// The engines' differences in one configuration, held against the scenario's envelope; of more than
-/// two engines, those of the pair that differs most in a quantity.
+/// The engines' differences in one configuration, compared with the scenario's envelope; of more than two engines,
+/// those of the pair that differs most in a quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Adjudication {
-    /// Every quantity that could be judged.
+    /// Every quantity that could be evaluated.
     pub quantities: Vec<JudgedQuantity>,
 }
 
@@ -34,7 +36,7 @@ impl Adjudication {
         self.quantities.iter().any(|each| !each.pass)
     }
 
-    /// Whether anything is beyond its limit that a referee without contacts can judge.
+    /// Whether any quantity that a reference integrator without contacts can evaluate is beyond its limit.
     pub fn needs_referee(&self) -> bool {
         self.quantities
             .iter()
@@ -71,7 +73,7 @@ pub struct JudgedQuantity {
 pub struct Ruling {
     /// When the limit was first exceeded.
     pub first_time_s: f64,
-    /// Engine nearer to the referee; none where there is none, as in contact.
+    /// Engine closer to the reference integrator; none where there is none, as in contact.
     pub nearer: Option<String>,
     /// Likely cause.
     pub cause: Cause,
@@ -100,10 +102,10 @@ impl Cause {
     pub fn words(self) -> &'static str {
         match self {
             Self::ContactOnset => "contact begins at different times",
-            Self::ContactSoftness => "contact softness",
+            Self::ContactSoftness => "contact compliance",
             Self::Saturation => "torque saturation",
-            Self::StepTooLong => "step too long",
-            Self::ModelsDiffer => "unexplained: the engines do not simulate the same thing",
+            Self::StepTooLong => "time step too long",
+            Self::ModelsDiffer => "unexplained: the engines simulate different models",
         }
     }
 }
@@ -111,7 +113,7 @@ impl Cause {
 /// What an inquiry may know besides the recordings.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Evidence<'a> {
-    /// The engines beside the referee.
+    /// The engines compared with the reference integrator.
     pub referee: Option<&'a RefereeReport>,
     /// How pairs of engines differ at the scenario's step and smaller ones.
     pub convergence: &'a [PairConvergence],
@@ -140,7 +142,7 @@ pub fn judge_differences(
     (runs.len() > 1).then_some(Adjudication { quantities })
 }
 
-/// The same, and for every limit that is exceeded who is nearer to the referee and why.
+/// The same, and for every limit that is exceeded which engine is closer to it and why.
 pub fn adjudicate(
     cell: &Cell,
     goal: &Goal,
@@ -225,7 +227,7 @@ const PEAK_TIP: &str = "engines.envelope.peak_tip_um";
 const JOINT_TORQUE: &str = "engines.envelope.joint_torque_nm";
 const SETTLED_TIP: &str = "engines.envelope.settled_tip_nm";
 
-/// What is judged of two motions that touch nothing.
+/// What is evaluated of two motions that touch nothing.
 pub(crate) const WITHOUT_CONTACT: [&str; 3] = [PEAK_TIP, JOINT_TORQUE, SETTLED_TIP];
 
 /// Every quantity with the pair of engines that differs most in it.
@@ -363,7 +365,7 @@ fn cause(
     {
         return (
             Cause::Saturation,
-            format!("the torque of {joint} is at its limit in {engine} at {time_s:.3} s"),
+            format!("torque of {joint} saturated in {engine} at {time_s:.3} s"),
         );
     }
     let of_pair = evidence
@@ -374,12 +376,12 @@ fn cause(
     let [whole, half, ..] = convergence else {
         return (
             Cause::ModelsDiffer,
-            "no contact, no torque at its limit, and no run at a smaller step".to_owned(),
+            "no contact, no saturated torque, and no run with a smaller step".to_owned(),
         );
     };
     let shrunk = half.peak_tip_m / whole.peak_tip_m;
     let words = format!(
-        "the tips differ by {:.3} um at {:.3} ms and by {:.3} um at {:.3} ms{}",
+        "tip difference {:.3} um at step {:.3} ms and {:.3} um at step {:.3} ms{}",
         whole.peak_tip_m * 1e6,
         whole.timestep_s * 1e3,
         half.peak_tip_m * 1e6,
@@ -425,7 +427,7 @@ fn contact_cause(
             .min(recording.state.len() - 1);
         let contact = &recording.state[at].contact;
         format!(
-            "{:.3} um deep under {:.3} N in {name}",
+            "penetration {:.3} um at {:.3} N in {name}",
             contact.deepest_penetration_m * 1e6,
             contact.normal_force_n
         )
@@ -433,7 +435,7 @@ fn contact_cause(
     (
         Cause::ContactSoftness,
         format!(
-            "at {:.4} s {} and {}",
+            "at {:.4} s: {} and {}",
             judged.time_s,
             describe(names[0], runs[0]),
             describe(names[1], runs[1])
@@ -459,8 +461,8 @@ fn first_saturation(
         })
 }
 
-/// The engine of a pair that stays nearer to the referee under held torques: in closed loop a servo
-/// hides most of what an engine gets wrong. None where one of them was not held against it.
+/// The engine of a pair that stays nearer to the reference integrator under held torques: in closed loop a servo hides
+/// most of what an engine gets wrong. None where one of them was not compared with it.
 fn nearer(cause: Cause, pair: [&Recording; 2], evidence: Evidence<'_>) -> Option<String> {
     if matches!(cause, Cause::ContactOnset | Cause::ContactSoftness) {
         return None;
@@ -486,13 +488,13 @@ pub fn sentence(judged: &JudgedQuantity) -> Option<String> {
         .joint
         .map_or(String::new(), |joint| format!(" of {joint}"));
     let nearer = ruling.nearer.as_ref().map_or(String::new(), |engine| {
-        format!(" {engine} is nearer to the referee;")
+        format!(" {engine} is closer to the reference integrator;")
     });
     let engines = judged
         .engines
         .map_or("engines".to_owned(), |engines| engines.join(" and "));
     Some(format!(
-        "{engines} differ{joint} from {:.3} s on, most at {:.3} s;{nearer} likely cause: {} ({})",
+        "{engines} differ{joint} from {:.3} s, most at {:.3} s;{nearer} likely cause: {} ({})",
         ruling.first_time_s,
         judged.time_s,
         ruling.cause.words(),

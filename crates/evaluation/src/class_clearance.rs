@@ -21,7 +21,7 @@ pub struct ClassClearance {
     pub pair: [String; 2],
     /// Nearest (or deepest) points of the two, in the world.
     pub witness_points_m: [[f64; 3]; 2],
-    /// Phase of the motion; `final_posture` without one, `insertion` for the needle's route.
+    /// Phase of the motion; `final_posture` without one, `insertion` for the needle path.
     pub phase: &'static str,
     /// Time in the motion.
     pub time_s: Option<f64>,
@@ -37,7 +37,7 @@ pub struct ClearanceReport {
     pub classes: BTreeMap<&'static str, ClassClearance>,
     /// Least over the classes of physical bodies, the guide's intended stand-off left out.
     pub minimum_m: Option<f64>,
-    /// Least proven lower bound over the same classes; none unless all of them have one.
+    /// Least certified lower bound over the same classes; none unless all of them have one.
     pub minimum_certified_m: Option<f64>,
 }
 
@@ -68,13 +68,13 @@ impl ClearanceReport {
 
     /// The least clearance of physical bodies from each other, the guide's intended stand-off left
     /// out.
-    pub fn least(&self) -> Option<&ClassClearance> {
+    fn least(&self) -> Option<&ClassClearance> {
         self.physical()
             .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
     }
 
     /// The least clearance of arm and tool from what stands around them, the arm's own left out.
-    pub(crate) fn least_from_surroundings(&self) -> Option<&ClassClearance> {
+    pub fn least_from_surroundings(&self) -> Option<&ClassClearance> {
         let classes = self.classes.iter();
         classes
             .filter(|(class, _)| {

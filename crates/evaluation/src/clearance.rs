@@ -72,7 +72,7 @@ impl ClearanceSeries {
 
 /// Samples the clearance of a recorded motion every `period_s`, first and last state included.
 ///
-/// The least clearance of the needle corridor is that while the arm holds its place.
+/// The least clearance of the access zone is that of the hold phase.
 pub fn measure_clearance(
     cell: &Cell,
     model: &ClearanceModel,
@@ -115,8 +115,8 @@ pub fn measure_clearance(
     series
 }
 
-/// Adds to a recording's least clearances their proven lower bounds, and replaces those that are
-/// undercut between the samples.
+/// Adds to a recording's least clearances their certified lower bounds, and replaces those that are undercut between
+/// the samples.
 ///
 /// What is certified is the recorded course itself, every step of it, linear in between: tracking
 /// errors are part of it, and need no allowance of their own.
@@ -141,9 +141,8 @@ pub fn certify_recording(
     );
 }
 
-/// Least clearances over a recording with their proven lower bounds: those of
-/// [`measure_clearance`] and [`certify_recording`] together, but for the error of the distances
-/// (`1e-9 m`), at a small part of the cost.
+/// Least clearances over a recording with their certified lower bounds: those of [`measure_clearance`] and
+/// [`certify_recording`] together, but for the error of the distances (`1e-9 m`), at a small part of the cost.
 pub fn recorded_clearance(
     cell: &Cell,
     model: &ClearanceModel,
@@ -179,7 +178,7 @@ pub fn certified_clearance(
     minima
 }
 
-/// Least clearances of a planned motion with their proven lower bounds.
+/// Least clearances of a planned motion with their certified lower bounds.
 pub fn planned_clearance(
     cell: &Cell,
     model: &ClearanceModel,

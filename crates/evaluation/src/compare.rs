@@ -20,7 +20,7 @@ pub struct CompareOptions {
     pub renamed_goals: Vec<(String, String)>,
     /// Losses that are allowed.
     pub thresholds: Vec<Threshold>,
-    /// A configuration that no longer works does not fail the comparison.
+    /// A configuration that is no longer feasible does not fail the comparison.
     pub allow_status_change: bool,
     /// A goal, a configuration or a metric that only the first has does not fail the comparison.
     pub allow_lost: bool,
@@ -198,7 +198,7 @@ pub struct MetricComparison {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CompareError {
     /// A goal that is said to be renamed is not there.
-    #[error("{report} has no goal `{goal}`, but {known}")]
+    #[error("{report} has no goal `{goal}`; it has {known}")]
     UnknownGoal {
         /// The report.
         report: String,
@@ -214,7 +214,7 @@ pub enum CompareError {
         goal: String,
     },
     /// Not one goal is in both.
-    #[error("the two have no goal in common: {a} against {b}")]
+    #[error("the reports have no goal in common: {a} and {b}")]
     NothingInCommon {
         /// Goals of the first.
         a: String,
@@ -225,11 +225,10 @@ pub enum CompareError {
 
 /// Compares two results, goal by goal and configuration by configuration.
 ///
-/// Lost is what a metric got worse by. The comparison fails where a loss is more than a threshold
-/// allows for a configuration that worked and is not rejected now, where a metric with a threshold
-/// is no longer measured or never was; unless that is allowed where a configuration that worked does not;
-/// and, unless that is allowed, where a goal, a configuration, or a metric of one that works in both is
-/// missing in the second.
+/// Lost is what a metric got worse by. The comparison fails where a loss is more than a threshold allows for a
+/// configuration that worked and is not rejected now, where a metric with a threshold is no longer measured or never
+/// was; unless that is allowed where a configuration that worked does not; and, unless that is allowed, where a goal, a
+/// configuration, or a metric of one feasible in both is missing in the second.
 ///
 /// # Errors
 /// If the goals cannot be matched.
@@ -263,7 +262,7 @@ pub fn compare(
         .flat_map(|goal| &goal.configurations)
         .flat_map(|each| &each.metrics);
     if !metrics.any(|found| found.a.is_some() && found.b.is_some()) {
-        notes.push("no number is in both: nothing but what became of each is compared".to_owned());
+        notes.push("no metric is in both: only outcomes are compared".to_owned());
     }
     for threshold in &options.thresholds {
         let found = threshold_failures(&goals, threshold);
@@ -503,7 +502,7 @@ fn status_failures(goals: &[GoalComparison], b: &StoredReport) -> Vec<Comparison
             let now = each.status_b.as_deref().unwrap_or("missing");
             let missed = || {
                 let missed = missed(b, goal.b.as_deref()?, &each.label);
-                (!missed.is_empty()).then(|| format!("missed: {}", missed.join(", ")))
+                (!missed.is_empty()).then(|| format!("failed: {}", missed.join(", ")))
             };
             let why = each.rejection_b.clone().or_else(missed);
             let why = why.map_or(String::new(), |why| format!(" ({why})"));
@@ -511,14 +510,14 @@ fn status_failures(goals: &[GoalComparison], b: &StoredReport) -> Vec<Comparison
                 goal: Some(goal.name().to_owned()),
                 label: Some(each.label.clone()),
                 metric: None,
-                detail: format!("was {before}, is {now}{why}"),
+                detail: format!("was {before}, now {now}{why}"),
             });
         }
     }
     failures
 }
 
-/// Criteria that a configuration of a report misses.
+/// Criteria that a configuration of a report fails.
 fn missed<'a>(report: &'a StoredReport, goal: &str, label: &str) -> Vec<&'a str> {
     let criteria = report.value("/criteria").and_then(Value::as_array);
     let of_it = criteria.into_iter().flatten().filter(|each| {
@@ -535,7 +534,7 @@ fn missed<'a>(report: &'a StoredReport, goal: &str, label: &str) -> Vec<&'a str>
 /// Metrics that a failure names; the rest are counted.
 const MOST_NAMED: usize = 6;
 
-/// Goals, configurations, and metrics of configurations that work in both, that the second does not have.
+/// Goals, configurations, and metrics of configurations feasible in both, that the second does not have.
 fn lost(goals: &[GoalComparison]) -> Vec<ComparisonFailure> {
     let mut failures = Vec::new();
     for goal in goals {
@@ -559,7 +558,7 @@ fn lost(goals: &[GoalComparison]) -> Vec<ComparisonFailure> {
             let label = Some(each.label.as_str());
             if each.status == Change::Lost {
                 let before = each.status_a.as_deref().unwrap_or("missing");
-                fail(label, None, format!("was {before}, is missing"));
+                fail(label, None, format!("was {before}, now missing"));
                 continue;
             }
             // What is rejected is measured as far as it came, which is no loss of its own.
@@ -637,14 +636,14 @@ fn threshold_failures(goals: &[GoalComparison], threshold: &Threshold) -> Held {
         measured = true;
         let text = |value: f64| metric.quantity.text(value);
         let detail = match second {
-            None => format!("{words}: was {}, is no longer measured", text(first)),
+            None => format!("{words}: was {}, no longer measured", text(first)),
             Some(second) => {
                 let loss = -metric.gain(first, second);
                 if !threshold.limit.is_exceeded_by(loss, first) {
                     continue;
                 }
                 format!(
-                    "{words}: {} to {}, worse by {}, allowed {}",
+                    "{words}: {} to {}, worse by {}, threshold {}",
                     text(first),
                     text(second),
                     threshold.loss_text(loss, first),
@@ -660,14 +659,14 @@ fn threshold_failures(goals: &[GoalComparison], threshold: &Threshold) -> Held {
         });
     }
     if !measured {
-        // A threshold that nothing is held against would pass for ever.
+        // A threshold that nothing is compared with would always pass.
         failures.push(ComparisonFailure {
             goal: None,
             label: None,
             metric: Some(key.into_owned()),
             detail: format!(
-                "{words}: the first result has it for no configuration that works in both, so its \
-                 threshold checks nothing"
+                "{words}: not measured in the first result for any configuration feasible in both, \
+                 so its threshold checks nothing"
             ),
         });
     }

@@ -1,11 +1,12 @@
 //! Contacts, one by one.
 
 use nalgebra::Vector3;
-use needlebench_cell::{Cell, Frame, Goal};
+use needlebench_cell::{Cell, Frame};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::Recording;
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_scenario::Goal;
 use serde::Serialize;
 
 use crate::needle::tip_of;

@@ -1,8 +1,8 @@
 //! Criteria of a scenario on the values of a configuration.
 
-use needlebench_cell::Limit;
-use needlebench_cell::scenario::CriteriaSection;
-use needlebench_cell::study::StudyMode;
+use needlebench_input::Limit;
+use needlebench_scenario::scenario::CriteriaSection;
+use needlebench_scenario::study::StudyMode;
 
 use crate::adjudication::{WITHOUT_CONTACT, sentence};
 use crate::metric::{Better, Criterion, Metric, Missing, Quantity, Source, metrics};
@@ -42,7 +42,7 @@ fn limits(
     })
 }
 
-/// Keys of the criteria that have a limit and that cases of a mode are judged by.
+/// Keys of the criteria that have a limit and that cases of a mode are evaluated by.
 pub fn criteria_with_limits(criteria: &CriteriaSection, mode: StudyMode) -> Vec<&'static str> {
     let mut keys: Vec<&'static str> = limits(criteria, mode)
         .map(|(_, criterion, _)| criterion.key)
@@ -117,11 +117,11 @@ fn of_configuration<'a>(
     .filter(|checked| checked.value.is_some() || checked.criterion.missing != Missing::Skips)
 }
 
-/// Checks a configuration that works against all criteria; a run's are those of a dynamic case.
+/// Checks a feasible configuration against all criteria; a run's are those of a dynamic case.
 ///
-/// Values of the engines are checked for each of `engines`, those that were to measure it; clearances
-/// over all of them and by their proven lower bounds; what engines differ by where there are several of
-/// them. What was to be measured and was not is not judged.
+/// Values of the engines are checked for each of `engines`, those that were to measure it; clearances over all of them
+/// and by their certified lower bounds; what engines differ by where there are several of them. What was to be measured
+/// and was not is not evaluated.
 pub fn check_configuration(
     goal: &str,
     configuration: &ConfigurationReport,
@@ -160,7 +160,7 @@ pub fn check_configuration(
         if never && result.value.is_none() {
             judged.results.push(result);
         } else {
-            judged.add(result, || "it has no value".to_owned());
+            judged.add(result, || "no value".to_owned());
         }
     }
     let unmeasured = |name: &&&str| !configuration.engines.contains_key(**name);
@@ -198,8 +198,8 @@ pub fn check_configuration(
     }
     for checked in others {
         judged.add(result(checked), || match &configuration.budget_failure {
-            Some(failure) => format!("there is no error budget: {failure}"),
-            None => "it was not measured".to_owned(),
+            Some(failure) => format!("no error budget: {failure}"),
+            None => "not measured".to_owned(),
         });
     }
     if configuration.engines.is_empty() && !absent.is_empty() {
@@ -207,7 +207,7 @@ pub fn check_configuration(
         for key in planned_alone(configuration, criteria, mode) {
             judged
                 .not_judged
-                .push(missing(None, key, "no engine measured it".to_owned()));
+                .push(missing(None, key, "measured by no engine".to_owned()));
         }
     }
     if let Some(events) = &configuration.events {
@@ -223,8 +223,8 @@ fn is_known(family: &str, configuration: &ConfigurationReport) -> bool {
         .any(|metric| metric.read(configuration).is_some())
 }
 
-/// Keys of criteria that are skipped where nothing is measured, but could be judged in another mode: there
-/// is something to measure.
+/// Keys of criteria that are skipped where nothing is measured, but could be evaluated in another mode: there is
+/// something to measure.
 fn planned_alone(
     configuration: &ConfigurationReport,
     criteria: &CriteriaSection,

@@ -1,4 +1,4 @@
-//! What is measured of contacts that were asked for, of stops, and of the way back.
+//! What is measured of prescribed contacts, of stops, and of the retreat.
 
 mod envelope;
 mod press;
@@ -7,7 +7,7 @@ mod stop;
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::arm::BrakeFigures;
+use needlebench_cell::BrakeFigures;
 use serde::Serialize;
 
 pub use envelope::{StopEnvelope, stopping_envelope};
@@ -26,9 +26,9 @@ pub struct EventsReport {
     pub press: Vec<PressReport>,
     /// The stop; none if the scenario asks for none.
     pub stop: Option<StopReport>,
-    /// The way back, by engine; empty if the scenario does not ask for it.
+    /// The retreat, by engine; empty if the scenario does not prescribe it.
     pub retract: BTreeMap<String, RetractionEngineReport>,
-    /// What was judged and what was to be; in the report's own lists of criteria.
+    /// What was evaluated and what was to be; in the report's own lists of criteria.
     #[serde(skip)]
     pub checks: Judged,
 }
@@ -54,8 +54,8 @@ pub struct StopReport {
 }
 
 /// How far brakes that are derived from published stops are tested, in the words of reports.
-pub const BRAKES_FIT: &str = "two torques of each joint are fitted to its two published figures: no published stop is \
-                              left to test them by";
+pub const BRAKES_FIT: &str = "two torques of each joint are fitted to its two published figures; no published stop remains \
+     to verify them";
 
 /// Brakes of the joints, derived from an arm's published stops.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,9 +1,9 @@
-//! What is reported of a run that excites every joint, and its criteria.
+//! What is reported of an excitation run, and its criteria.
 
 use std::collections::BTreeMap;
 
 use needlebench_cell::ClearanceClass;
-use needlebench_cell::scenario::CriteriaSection;
+use needlebench_scenario::scenario::CriteriaSection;
 use serde::Serialize;
 
 use crate::class_clearance::ClearanceReport;
@@ -25,11 +25,11 @@ pub struct ExcitationReport {
     pub dwell_s: f64,
     /// Duration with one payload, s.
     pub duration_s: f64,
-    /// Least clearance from everything else that is asked for, m.
+    /// Required clearance from everything else, m.
     pub clearance_limit_m: f64,
-    /// Least clearance from itself that is asked for, m.
+    /// Required self-clearance, m.
     pub self_clearance_limit_m: f64,
-    /// Proven clearances of the planned motions, all together.
+    /// Certified clearances of the planned motions, all together.
     pub planned: ClearanceReport,
     /// Motion by motion.
     pub motions: Vec<MotionReport>,
@@ -48,7 +48,7 @@ pub struct ExcitationReport {
 pub struct MotionReport {
     /// In words.
     pub motion: String,
-    /// Its proven clearances.
+    /// Its certified clearances.
     pub clearance: ClearanceReport,
 }
 
@@ -57,11 +57,11 @@ pub struct MotionReport {
 pub struct LoadReport {
     /// Mass besides the tool, kg.
     pub added_kg: f64,
-    /// Mass at the flange that the controller believes in, tool included, kg.
+    /// Mass at the flange that the controller assumes, tool included, kg.
     pub payload_kg: f64,
     /// Its centre in the flange frame, m.
     pub payload_cog_m: [f64; 3],
-    /// How the arm that is simulated differs from what its controller believes; none if it does not.
+    /// How the arm that is simulated differs from what its controller assumes; none if it does not.
     pub truth: Option<TruthReport>,
 }
 
@@ -81,7 +81,7 @@ pub struct LoadMeasurement {
     pub effort: Effort,
 }
 
-/// Least proven clearance from everything else, and from itself, m; none where nothing is measured.
+/// Least certified clearance from everything else, and from itself, m; none where nothing is measured.
 pub fn proven_m(clearance: &ClearanceReport) -> [Option<f64>; 2] {
     let least = |is_self: bool| {
         let classes = clearance.classes.iter().filter(|(name, _)| {

@@ -1,9 +1,10 @@
 //! Verdict.
 
-use needlebench_cell::scenario::CriteriaSection;
-use needlebench_cell::study::StudyMode;
-use needlebench_cell::{Expectation, Goal};
+use needlebench_cell::part_in_words;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::scenario::CriteriaSection;
+use needlebench_scenario::study::StudyMode;
+use needlebench_scenario::{Expectation, Goal};
 
 use crate::check_configuration;
 use crate::report::{
@@ -17,14 +18,13 @@ pub const EXPECTED: &str = "expected";
 /// Criterion of the margins that the planned needle keeps, and the rule that rejects where it does not.
 const NEEDLE_ROUTE: &str = "needle_route";
 
-/// Judges all configurations of all goals: sets each status, and returns every criterion that was
-/// judged or was to be. `engines` are those that were to measure.
+/// Evaluates all configurations of all goals: sets each status, and returns every criterion that was evaluated or was
+/// to be. `engines` are those that were to measure.
 ///
-/// A configuration that works is `failed` if it misses a criterion, or if no engine measured it. The
-/// verdict is `fail` if any configuration misses one, unless that was expected; if a goal has fewer
-/// working configurations than asked for; if the planned needle comes too near to what it has to keep
-/// away from; or if a configuration's outcome is not the expected one. It
-/// is `incomplete` if none of this is known and something was not measured that was to be judged.
+/// A feasible configuration is `failed` if it fails a criterion, or if no engine measured it. The verdict is `fail` if
+/// any configuration fails a criterion, unless that was expected; if fewer configurations of a goal pass than required;
+/// if the planned needle violates a required margin; or if a configuration's outcome is not the expected one. It is
+/// `incomplete` if none of this is known and something was not measured that was to be evaluated.
 pub fn judge(
     goals: &mut [GoalReport],
     planned: &[Goal],
@@ -114,7 +114,7 @@ pub fn judge(
     (Verdict::of(failed, !all.not_judged.is_empty()), all)
 }
 
-/// Whether a goal expects of every configuration that the needle's route rejects it.
+/// Whether a goal expects of every configuration that the needle path rejects it.
 pub fn route_is_expected(goal: &Goal) -> bool {
     Configuration::ALL.iter().all(|each| {
         let expected = goal.expected.get(each);
@@ -122,13 +122,13 @@ pub fn route_is_expected(goal: &Goal) -> bool {
     })
 }
 
-/// The margins of the needle's route. One that is missed is met all the same where it is what is expected
-/// of every configuration.
+/// The margins of the needle path. A violated one still counts as met where every configuration is expected to
+/// be rejected by it.
 fn check_route(goal: &Goal, route: &RouteReport) -> CriterionResult {
     let does = if route.kept {
-        "keeps away from"
+        "satisfies its margin to"
     } else {
-        "does not keep away from"
+        "violates its margin to"
     };
     CriterionResult {
         goal: goal.name.clone(),
@@ -141,14 +141,15 @@ fn check_route(goal: &Goal, route: &RouteReport) -> CriterionResult {
         pass: route.kept || route_is_expected(goal),
         detail: format!(
             "the planned needle {does} {} ({})",
-            route.part, route.tissue
+            part_in_words(&route.part),
+            route.tissue
         ),
         requirement: None,
     }
 }
 
-/// Why a criterion on what became of configurations is not judged.
-const DEPENDS: &str = "it depends on what was not judged";
+/// Why a criterion on outcomes of configurations is not evaluated.
+const DEPENDS: &str = "depends on criteria that were not evaluated";
 
 fn check_expectation(
     goal: &str,

@@ -1,10 +1,11 @@
 //! How a plant followed its trajectory.
 
 use nalgebra::Point3;
-use needlebench_cell::{Cell, Goal};
+use needlebench_cell::Cell;
 use needlebench_engine::Recording;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_kinematics::{JOINT_LABELS, Joints};
+use needlebench_scenario::Goal;
 use serde::Serialize;
 
 use crate::contact::{ContactEpisode, episodes};
@@ -58,7 +59,7 @@ pub struct MotionMeasurement {
     pub contact: ContactMeasurement,
 }
 
-/// A joint that asked for more torque than it has.
+/// A joint whose torque saturated.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SaturatedJoint {
     /// Label of the joint.

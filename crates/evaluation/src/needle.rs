@@ -1,8 +1,9 @@
 //! Where the needle would go through the guide as it stands.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use needlebench_cell::{Cell, Goal, PlacedPhantom};
+use needlebench_cell::Cell;
 use needlebench_kinematics::Pose;
+use needlebench_scenario::{Goal, PlacedPhantom};
 use serde::Serialize;
 
 /// Needle metrics of one pose of the flange.

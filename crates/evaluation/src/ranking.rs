@@ -1,8 +1,8 @@
 //! Ranking of the configurations of a goal, with every term of it.
 //!
 //! The score of a configuration is the weighted mean of its utilities,
-//! `sum_k w_k u_k / sum_k w_k`, over the metrics that were measured for *every* configuration that
-//! works: a metric that one of them lacks would compare different sums. Utilities are those of the
+//! `sum_k w_k u_k / sum_k w_k`, over the metrics that were measured for *every* feasible
+//! configuration: a metric that one of them lacks would compare different sums. Utilities are those of the
 //! values as measured. Scores that differ by no more than [`SAME_SCORE`] are even, and the first in the
 //! report's order comes first: noise far below every resolution decides nothing. The Pareto set compares
 //! values two by two, each with its resolution ([`crate::pareto`]); a configuration that is beaten there
@@ -10,7 +10,7 @@
 
 use std::cmp::Ordering;
 
-use needlebench_cell::ranking::{Aim, RankingSection};
+use needlebench_scenario::ranking::{Aim, RankingSection};
 
 use crate::metric::{Better, Bound, Metric, metrics};
 use crate::pareto::{Scale, dominates, pareto_set};
@@ -20,7 +20,7 @@ pub use crate::ranking_report::{
 use crate::reason::{one_sentence, reason};
 use crate::report::{ConfigurationReport, GoalReport, Recommendation, Status};
 
-/// A metric that counts, with the values of all configurations that work.
+/// A metric that counts, with the values of all feasible configurations.
 struct Column {
     metric: &'static Metric,
     aim: Aim,
@@ -109,7 +109,7 @@ pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
         configuration.ranking = scored.as_ref().map(|scored| {
             let rank = order.iter().position(|&other| other == at);
             RankingReport {
-                rank: 1 + rank.expect("the order holds all that work"),
+                rank: 1 + rank.expect("the order holds all feasible ones"),
                 ..scored[at].clone()
             }
         });
@@ -118,10 +118,14 @@ pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
         let at = |position: usize| order.get(position).map(|&at| working[at]);
         let chosen = &goal.configurations[working[first]];
         let next = at(1).map(|index| &goal.configurations[index]);
+        let all: Vec<&ConfigurationReport> = working
+            .iter()
+            .map(|&index| &goal.configurations[index])
+            .collect();
         Recommendation {
             label: chosen.label.to_owned(),
-            summary: one_sentence(chosen, next, &summary),
-            reason: reason(chosen, next, &summary),
+            summary: one_sentence(chosen, next, &all, &summary),
+            reason: reason(chosen, next, &all, &summary),
         }
     });
     goal.ranking = Some(summary);
@@ -130,9 +134,9 @@ pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
 /// The metrics that can be ranked by, one for each key of the scenario's `[ranking]`, and the columns of
 /// those that every configuration has.
 ///
-/// Of several metrics with one key the last counts that any configuration has: the tip error over all
-/// arms and patients where there is a budget, a proven clearance where there is one. Where none has, the
-/// proven or the first one is named.
+/// Of several metrics with one key the last counts that any configuration has: the tip error over the arm and patient
+/// population where there is a budget, a certified clearance where there is one. Where none has, the proven or the
+/// first one is named.
 fn columns(
     configurations: &[ConfigurationReport],
     working: &[usize],

@@ -6,7 +6,7 @@ use serde::Serialize;
 /// resolution of any metric changes.
 pub const SAME_SCORE: f64 = 1e-9;
 
-/// Score of a configuration that works.
+/// Score of a feasible configuration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RankingReport {
     /// 1 is the first choice.
@@ -49,7 +49,7 @@ pub struct Dominance {
 /// How the configurations of a goal compare.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GoalRanking {
-    /// Configurations that work, first choice first.
+    /// Feasible configurations, first choice first.
     pub order: Vec<String>,
     /// Those that no other one beats, in the order of the report.
     pub pareto_set: Vec<String>,
@@ -86,7 +86,7 @@ pub struct RankedMetric {
     pub best: f64,
     /// Whether it decides on the Pareto set.
     pub in_pareto_set: bool,
-    /// Configurations that work and for which it was not measured: then it counts for none.
+    /// Feasible configurations for which it was not measured: then it counts for none.
     pub not_measured_for: Vec<String>,
 }
 

@@ -3,54 +3,75 @@
 use crate::metric::{Bound, Metric};
 use crate::ranking_report::{GoalRanking, RankingReport, SAME_SCORE, Term};
 use crate::report::ConfigurationReport;
-use needlebench_cell::{pair_in_words, part_in_words};
+use needlebench_cell::pair_in_words;
 
 /// Terms that are named for the first choice and, of the runner-up's leads, against it.
 const NAMED: (usize, usize) = (3, 2);
-/// Share of all differences of contributions below which one is not worth a word.
+/// Share of all differences of contributions below which one is not named.
 const WORTH_A_WORD: f64 = 0.1;
 
-/// Why `first` is chosen of all that work.
+/// Why `first` is chosen of `all` feasible ones.
 pub(crate) fn reason(
     first: &ConfigurationReport,
     second: Option<&ConfigurationReport>,
+    all: &[&ConfigurationReport],
     ranking: &GoalRanking,
 ) -> String {
     let nearest = first.clearance.least_from_surroundings().map(|found| {
         format!(
-            "clearance {:.1} mm ({} to {} in the {})",
-            found.minimum_m * 1e3,
-            part_in_words(&found.pair[0]),
-            part_in_words(&found.pair[1]),
-            found.phase
+            "clearance {} mm ({} in the {}){}",
+            shown_mm(found.minimum_m),
+            pair_in_words(&found.pair),
+            found.phase,
+            shared(found.minimum_m, all)
         )
     });
     let mut clauses = match second {
-        None => vec!["the only one that works".to_owned()],
+        None => vec!["the only feasible configuration".to_owned()],
         Some(second) => against(first, second, ranking),
     };
     clauses.extend(nearest);
     clauses.join("; ")
 }
 
-/// The same in one sentence: what it beats, in what, and how near anything comes.
+/// The same in one sentence: runner-up of `all` feasible ones, in what it is worse, and the clearance.
 pub(crate) fn one_sentence(
     first: &ConfigurationReport,
     second: Option<&ConfigurationReport>,
+    all: &[&ConfigurationReport],
     ranking: &GoalRanking,
 ) -> String {
     let why = second.map_or_else(
-        || "the only one that works".to_owned(),
+        || "the only feasible configuration".to_owned(),
         |second| beside(first, second, ranking),
     );
     // As the column of that name.
     match first.clearance.least_from_surroundings() {
         Some(found) => format!(
-            "{why}; clearance {:.1} mm ({})",
-            found.minimum_m * 1e3,
-            pair_in_words(&found.pair)
+            "{why}; clearance {} mm ({}){}",
+            shown_mm(found.minimum_m),
+            pair_in_words(&found.pair),
+            shared(found.minimum_m, all)
         ),
         None => why,
+    }
+}
+
+fn shown_mm(metres: f64) -> String {
+    format!("{:.1}", metres * 1e3)
+}
+
+/// Remark on a clearance that is identical for all, as far as it is shown: the goal determines it, so it is no reason
+/// for one of them.
+fn shared(clearance_m: f64, all: &[&ConfigurationReport]) -> &'static str {
+    let has_it = |each: &&ConfigurationReport| {
+        let least = each.clearance.least_from_surroundings();
+        least.is_some_and(|least| shown_mm(least.minimum_m) == shown_mm(clearance_m))
+    };
+    if all.len() > 1 && all.iter().all(has_it) {
+        ", identical for all feasible"
+    } else {
+        ""
     }
 }
 
@@ -62,7 +83,7 @@ fn beside(
 ) -> String {
     let count = ranking.order.len();
     let (Some(mine), Some(theirs)) = (&first.ranking, &second.ranking) else {
-        return format!("first in the table of {count} that work");
+        return format!("first of {count} feasible");
     };
     let (ahead, behind) = differences(mine, theirs);
     let score = mine.score * 100.0;
@@ -77,16 +98,16 @@ fn beside(
         let decide = if apart.is_empty() {
             String::new()
         } else {
-            format!("; what would decide is {}", apart.join(" or "))
+            format!("; largest differences: {}", apart.join(", "))
         };
         return format!(
-            "score {score:.1} of 100, first of {count} that work, but not told apart from {} (within what the metrics \
-             resolve){decide}",
+            "score {score:.1}/100, first of {count} feasible, but tied with {} (within the \
+             metrics' resolution){decide}",
             and(&ranking.not_told_apart)
         );
     }
     let scores = format!(
-        "score {score:.1} of 100, best of {count} that work; next is {} with {:.1}",
+        "score {score:.1}/100, best of {count} feasible; runner-up {} ({:.1})",
         second.label,
         theirs.score * 100.0
     );
@@ -98,7 +119,7 @@ fn beside(
     if leads.is_empty() {
         return scores;
     }
-    format!("{scores}, behind in {}", leads.join(" and "))
+    format!("{scores} is worse in {}", leads.join(" and "))
 }
 
 /// What speaks for the first choice and against it beside the second.
@@ -110,30 +131,29 @@ fn against(
     let count = ranking.order.len();
     let (Some(mine), Some(theirs)) = (&first.ranking, &second.ranking) else {
         return vec![format!(
-            "first in the table of {count} that work: nothing that has a weight was measured for \
-             all of them"
+            "first of {count} feasible: no metric with a weight was measured for all of them"
         )];
     };
     let mut clauses = vec![
         format!(
-            "score {:.1} of 100, best of {count} that work",
+            "score {:.1}/100, best of {count} feasible",
             100.0 * mine.score
         ),
-        format!("{} has {:.1}", second.label, 100.0 * theirs.score),
+        format!("runner-up {} ({:.1})", second.label, 100.0 * theirs.score),
     ];
     let (ahead, behind) = differences(mine, theirs);
     if !ranking.not_told_apart.is_empty() {
         clauses.push(format!(
-            "not told apart from {}: their scores are nearer than the resolutions of the metrics add up to",
+            "tied with {}: scores differ by less than the metrics' resolutions add up to",
             and(&ranking.not_told_apart)
         ));
     }
     if (mine.score - theirs.score).abs() <= SAME_SCORE {
-        clauses.push("the two are even and it comes first in the table".to_owned());
+        clauses.push("scores are equal and it is listed first".to_owned());
     }
     for (words, terms, named) in [
-        ("ahead in", &ahead, NAMED.0),
-        ("behind in", &behind, NAMED.1),
+        ("better in", &ahead, NAMED.0),
+        ("worse in", &behind, NAMED.1),
     ] {
         let terms: Vec<String> = terms.iter().take(named).map(Difference::text).collect();
         if !terms.is_empty() {
@@ -144,8 +164,8 @@ fn against(
     if let Some(dominance) = &first.dominated_by {
         let better: Vec<&str> = dominance.better_in.iter().map(|key| words(key)).collect();
         clauses.push(format!(
-            "not in the Pareto set: leaving effort and preferences aside {} is better in {} and \
-             as good in everything else",
+            "not in the Pareto set (effort and preferences excluded): {} is better in {} and equal \
+             in everything else",
             dominance.label,
             better.join(", ")
         ));
@@ -181,9 +201,9 @@ impl Difference<'_> {
         // A table beside it has what was attained, which is a little more.
         let proven = metric.is_some_and(|metric| metric.bound == Bound::Certified);
         format!(
-            "{} ({}{} against {}: {:+.1})",
+            "{} ({}{} vs. {}: {:+.1})",
             words(self.mine.metric),
-            if proven { "proven " } else { "" },
+            if proven { "certified " } else { "" },
             text(self.mine.value),
             text(self.theirs.value),
             100.0 * self.lead
@@ -216,7 +236,7 @@ fn differences<'a>(
 
 fn robustness(ranking: &GoalRanking) -> String {
     let Some(change) = &ranking.smallest_weight_change else {
-        return "no change of a single weight would change the choice".to_owned();
+        return "no single weight change would alter the choice".to_owned();
     };
     let (words, winner) = (words(change.metric), &change.then_first);
     let (from, to) = (
@@ -225,9 +245,11 @@ fn robustness(ranking: &GoalRanking) -> String {
     );
     let more = change.even_at >= change.weight;
     if from == to {
-        let direction = if more { "more" } else { "less" };
-        return format!("the slightest {direction} weight of {words} would put {winner} first");
+        let direction = if more { "increase" } else { "decrease" };
+        return format!(
+            "the slightest {direction} in the weight of {words} would put {winner} first"
+        );
     }
     let direction = if more { "above" } else { "below" };
-    format!("a weight of {words} {direction} {to} instead of {from} would put {winner} first")
+    format!("a weight of {words} {direction} {to} (now {from}) would put {winner} first")
 }

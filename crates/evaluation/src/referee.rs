@@ -1,10 +1,11 @@
-//! What an engine's motion differs from the referee's by.
+//! What an engine's motion differs from the reference integrator's by.
 
 use std::collections::BTreeMap;
 
 use nalgebra::Point3;
-use needlebench_cell::{Cell, Goal};
+use needlebench_cell::Cell;
 use needlebench_engine::{HeldWindow, PlantState, Recording};
+use needlebench_scenario::Goal;
 use serde::Serialize;
 
 use crate::needle::tip_of;
@@ -19,7 +20,7 @@ pub const DOCUMENTED_ORDER: f64 = 1.0;
 /// order shows.
 pub const ORDER_TOLERANCE: f64 = 0.25;
 
-/// Each engine beside the referee, by the engine's name.
+/// Each engine compared with the reference integrator, by the engine's name.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct RefereeReport {
     /// By engine.
@@ -27,15 +28,15 @@ pub struct RefereeReport {
     pub engines: BTreeMap<String, RefereeComparison>,
 }
 
-/// One engine beside the referee, on the part of the motion before the first contact.
+/// One engine compared with the reference integrator, on the part of the motion before the first contact.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RefereeComparison {
     /// End of what was compared: that of the motion, or the first contact that the engine saw.
     pub until_s: f64,
-    /// Engine and referee, each in a closed loop with its own servo.
+    /// Engine and reference integrator, each in a closed loop with its own servo.
     pub closed_loop: TipDifference,
-    /// The referee from the engine's own states under the engine's recorded torques, window by window; none
-    /// where the motion is shorter than a window.
+    /// The reference integrator from the engine's own states under the engine's recorded torques, window by window;
+    /// none where the motion is shorter than a window.
     pub held_torques: Option<HeldTorques>,
     /// The closed loop again at smaller steps, the first entry at the scenario's own.
     pub convergence: Vec<StepDifference>,
@@ -56,7 +57,7 @@ impl RefereeComparison {
 /// some 0.1 mm), short enough for a difference to grow by gravity no more than some per cent.
 pub const HELD_WINDOW_S: f64 = 0.05;
 
-/// An engine beside the referee over windows of truly held torques, without any servo.
+/// An engine compared with the reference integrator over windows of truly held torques, without any servo.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct HeldTorques {
     /// Length of a window, s.

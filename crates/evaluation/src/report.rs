@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::{ArmReport, GravitySettings, LinkEnclosure};
 use needlebench_engine::EngineIdentity;
+use needlebench_robot::{ArmReport, LinkEnclosure};
+use needlebench_scenario::GravitySettings;
 use needlebench_uncertainty::budget::ErrorBudget;
 use serde::Serialize;
 
@@ -32,9 +33,9 @@ pub struct Report {
     pub scenario: ScenarioSummary,
     /// `pass`, `fail` or `incomplete`.
     pub verdict: Verdict,
-    /// Every criterion that was judged.
+    /// Every criterion that was evaluated.
     pub criteria: Vec<CriterionResult>,
-    /// Every criterion that was to be judged and could not be.
+    /// Every criterion that was to be evaluated and could not be.
     pub not_judged: Vec<NotJudged>,
     /// Requirements with the criteria that stand for them and what came of these; empty where the scenario
     /// has none.
@@ -45,7 +46,7 @@ pub struct Report {
     /// The test by ISO 9283, in place of goals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iso9283: Option<Iso9283Report>,
-    /// The run that excites every joint, in place of goals.
+    /// The excitation run, in place of goals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excitation: Option<ExcitationReport>,
     /// Engines that failed, and how; their results are missing.
@@ -74,7 +75,7 @@ pub struct Report {
     pub timings: BTreeMap<String, f64>,
 }
 
-/// What arm and patient the expected tip error is of.
+/// The arm and patient population of the RMS tip error.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ExpectedReport {
     /// `factory_calibrated`, `nominal_kinematics`, `calibrated_here`; none where the scenario's own
@@ -128,15 +129,15 @@ pub struct GoalReport {
     pub insertion_length_m: f64,
     /// Planned gap between guide exit and entry point.
     pub standoff_m: Option<f64>,
-    /// What the planned needle keeps away from least; none where there is nothing to keep away from.
+    /// The structure closest to its margin on the planned needle path; none where there is none.
     pub needle_route: Option<RouteReport>,
     /// Fissures of the lungs that the planned needle crosses.
     pub fissures_crossed: Vec<String>,
     /// All eight configurations.
     pub configurations: Vec<ConfigurationReport>,
-    /// The one to choose; none if none works.
+    /// The recommended one; none if none is feasible.
     pub recommended: Option<Recommendation>,
-    /// How those that work compare; none until they are ranked.
+    /// How the feasible ones compare; none until they are ranked.
     pub ranking: Option<GoalRanking>,
 }
 
@@ -149,7 +150,7 @@ pub struct RouteReport {
     pub tissue: String,
     /// Signed distance of the needle's surface, negative inside, never optimistic.
     pub distance_m: f64,
-    /// The least that it has to be.
+    /// The required distance.
     pub margin_m: f64,
     /// The margin is kept; if not, every configuration is rejected.
     pub kept: bool,
@@ -170,12 +171,12 @@ pub struct Recommendation {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// It works and meets all criteria that were judged; [`ConfigurationReport::not_judged`] says how
-    /// many were not.
+    /// It is feasible and meets all criteria that were evaluated; [`ConfigurationReport::not_judged`] says how many
+    /// were not.
     Ok,
-    /// It cannot work.
+    /// It is infeasible.
     Rejected,
-    /// It works but misses a criterion, or no engine could measure it.
+    /// It is feasible but fails a criterion, or no engine could measure it.
     Failed,
 }
 
@@ -195,7 +196,7 @@ impl Status {
 pub struct RejectionReport {
     /// Name of the rule.
     pub rule: &'static str,
-    /// The value that breaks it.
+    /// The value that violates it.
     pub value: f64,
     /// The limit.
     pub limit: f64,
@@ -223,7 +224,7 @@ pub struct MarginsReport {
 /// One phase of the planned motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PhaseReport {
-    /// `transfer`, `approach` or `hold`; `retract` or `return` on the way back.
+    /// `transfer`, `approach` or `hold`; `retract` or `return` on the retreat.
     pub phase: &'static str,
     /// Its start.
     pub start_s: f64,
@@ -244,9 +245,8 @@ pub struct SearchReport {
     pub seed: u64,
 }
 
-/// What a planned motion keeps of the clearance that its configuration allows. Clearances are proven lower
-/// bounds; margins are what they are beyond what is judged: the scenario's `[criteria]`, else the floors
-/// of `[planning]`.
+/// Margins of a planned motion, of those that its configuration allows. Clearances are certified lower bounds; margins
+/// are what they are beyond the required clearance: the scenario's `[criteria]`, else the floors of `[planning]`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MarginReport {
     /// Least margin from the surroundings that any motion to this posture could keep: that of the start, the
@@ -258,22 +258,22 @@ pub struct MarginReport {
     pub class: Option<&'static str>,
     /// What comes nearest in it: `start`, `approach` (with the place where it ends) or `transfer`.
     pub limited_by: Option<&'static str>,
-    /// How the search for a transfer ended: `bound`, it keeps what the other postures keep, or what is
-    /// ample, so that there is none that keeps more that counts; `proof`, a posture that every motion
-    /// must take is nearer than allowed; `budget`, there may be a better one.
+    /// How the search for a transit ended: `bound`, it keeps what the other postures keep, or what is ample, so that
+    /// there is none that keeps more that counts; `proof`, a posture that every motion must take is nearer than
+    /// allowed; `budget`, there may be a better one.
     pub search: &'static str,
-    /// What the straight transfer would have kept and taken; none where the transfer is straight.
+    /// What the straight transit would have kept and taken; none where the transit is straight.
     pub straight: Option<StraightReport>,
     /// The classes, by name.
     pub classes: BTreeMap<&'static str, ClassMarginReport>,
 }
 
-/// The straight transfer that a way around replaces.
+/// The straight transit that an alternative path replaces.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StraightReport {
     /// Least clearance from the surroundings, negative where it is blocked.
     pub clearance_m: f64,
-    /// The same of the way around.
+    /// The same of the alternative path.
     pub instead_m: f64,
     /// How long the motion would take.
     pub duration_s: f64,
@@ -282,7 +282,7 @@ pub struct StraightReport {
 /// What a motion keeps in one class.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ClassMarginReport {
-    /// What is judged.
+    /// The required clearance.
     pub limit_m: f64,
     /// Clearance of the start, the approach and the place where it ends.
     pub attainable_m: f64,
@@ -299,7 +299,7 @@ pub struct ConfigurationReport {
     pub label: &'static str,
     /// What became of it.
     pub status: Status,
-    /// How many criteria on it were to be judged and could not be.
+    /// How many criteria on it were to be evaluated and could not be.
     pub not_judged: usize,
     /// Rules that reject it, first failing one first.
     pub rejections: Vec<RejectionReport>,
@@ -307,7 +307,7 @@ pub struct ConfigurationReport {
     pub joints_rad: Option<[f64; 6]>,
     /// Angle of the guide about the needle.
     pub roll_rad: Option<f64>,
-    /// Whole turns added to the positions in (-pi, pi].
+    /// 2π equivalent: full revolutions added to the positions in (-pi, pi].
     pub wrap: Option<[i32; 6]>,
     /// Position residual of the inverse kinematics.
     pub ik_residual_m: Option<f64>,
@@ -319,13 +319,13 @@ pub struct ConfigurationReport {
     pub margins: Option<MarginsReport>,
     /// Planned motion.
     pub motion: Vec<PhaseReport>,
-    /// The way back out: straight back along the needle axis, then to the start posture. Empty
-    /// unless the configuration works. Planned and certified, not simulated.
+    /// The retreat: straight back along the needle axis, then to the start posture. Empty unless the configuration is
+    /// feasible. Planned and certified, not simulated.
     pub retreat: Vec<PhaseReport>,
-    /// Proven clearances of the way back, by itself, planned; empty where there is none.
+    /// Certified clearances of the retreat, by itself, planned; empty where there is none.
     pub retreat_clearance: ClearanceReport,
-    /// Search for a way around, where the straight transfer is blocked or comes nearer than the postures
-    /// that it joins; none where it was not needed.
+    /// Search for an alternative path, where the straight transit is blocked or comes nearer than the postures that it
+    /// joins; none where it was not needed.
     pub search: Option<SearchReport>,
     /// What the planned motion keeps of the clearance that its posture allows; none without a motion.
     pub margin: Option<MarginReport>,
@@ -339,35 +339,33 @@ pub struct ConfigurationReport {
     pub engine_difference: Option<EngineDifference>,
     /// The engines' difference and the scenario's envelope; none unless both ran.
     pub adjudication: Option<Adjudication>,
-    /// Each engine beside the referee; none unless asked for, or the envelope was exceeded.
+    /// Each engine compared with the reference integrator; none unless asked for, or the envelope was exceeded.
     pub referee: Option<RefereeReport>,
     /// Clearances over the motions of all engines; over the planned motion where nothing was
     /// simulated, and of the final posture where there is no motion.
     pub clearance: ClearanceReport,
-    /// Contacts, stop and way back, where the scenario asks for them.
+    /// Contacts, stop and retreat, where the scenario prescribes them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub events: Option<EventsReport>,
-    /// Signed clearances by class of the final posture of the nominal arm, with the needle's route;
-    /// empty without a posture.
+    /// Signed clearances by class of the final posture of the nominal arm, with the needle path; empty without a
+    /// posture.
     pub posture_clearance_m: BTreeMap<&'static str, f64>,
-    /// Distance of the posture from breaking a rule of the plan, negative where it breaks one; sines
+    /// Constraint margin: distance of the posture from violating a planning rule, negative where it violates one; sines
     /// and radians count 0.1 m.
     pub surplus_m: Option<f64>,
-    /// The needle where the balance of torques lets it come to rest, without any engine; where it is
-    /// commanded to without imperfections.
+    /// The needle in static equilibrium, without any engine; where it is commanded to without imperfections.
     pub predicted: Option<NeedleMeasurement>,
     /// Room that it leaves to the people around it.
     pub room: Option<RoomReport>,
     /// How far the needle's tip moves, root mean square, when every joint has an independent error.
     pub tip_sensitivity_m_per_rad: Option<f64>,
-    /// Whether it works and no other one that works is as good in everything and better in
-    /// something.
+    /// Whether it is feasible and no other feasible one is as good in everything and better in something.
     pub pareto: bool,
     /// The one that is, if any.
     pub dominated_by: Option<Dominance>,
-    /// Its score; none unless it works.
+    /// Its score; none unless it is feasible.
     pub ranking: Option<RankingReport>,
-    /// How far the needle is off over all arms and patients; none without imperfections.
+    /// Error budget of the needle over the arm and patient population; none without imperfections.
     pub budget: Option<ErrorBudget>,
     /// Why there is no budget, where there should be one.
     pub budget_failure: Option<String>,
@@ -428,8 +426,8 @@ pub struct EngineReport {
     /// Needle metrics of the settled state, from the engine's own body poses.
     #[serde(flatten)]
     pub needle: NeedleMeasurement,
-    /// Distance of the settled tip from where the balance of torques predicts it, without any
-    /// engine; none for the nominal robot. Trembling by the encoders' noise is no part of it.
+    /// Distance of the settled tip from static equilibrium, without any engine; none for the nominal robot. Trembling
+    /// by the encoders' noise is no part of it.
     pub unexplained_tip_m: Option<f64>,
     /// Time and effort.
     #[serde(flatten)]
@@ -457,7 +455,7 @@ pub struct Provenance {
     pub inputs: Vec<InputFile>,
     /// The scenario's seed.
     pub seed: u64,
-    /// Which model is the truth.
+    /// Which model is the ground truth.
     pub truth: &'static str,
 }
 

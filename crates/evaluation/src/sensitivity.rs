@@ -1,8 +1,9 @@
 //! How errors of the joints move the needle's tip.
 
 use nalgebra::Point3;
-use needlebench_cell::{Cell, Goal};
+use needlebench_cell::Cell;
 use needlebench_kinematics::Joints;
+use needlebench_scenario::Goal;
 
 /// Root of the sum of the squared speeds of the needle's tip under each joint alone, m/rad.
 ///

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use needlebench_cell::{Finding, printable, printable_line};
+use needlebench_input::{Finding, printable, printable_line};
 use serde_json::{Value, json};
 
 use crate::metric::MetricKey;
@@ -123,15 +123,15 @@ impl StoredReport {
     pub fn parse(file: &str, text: &str) -> Result<Self, Finding> {
         let mut report: Value = serde_json::from_str(text).map_err(|error| {
             let cut = if error.is_eof() {
-                "the file ends too early"
+                "the file is truncated"
             } else {
-                "the file is no JSON"
+                "the file is not JSON"
             };
             let finding = Finding::new(
                 file,
                 format!("{cut}: {error}"), // with line and column
             )
-            .hint("give a report.json as `needlebench run` writes it, or its folder");
+            .hint("give a report.json written by `needlebench run`, or its folder");
             let start = offset(text, error.line(), error.column());
             finding.at(text, start..(start + 1).min(text.len()))
         })?;
@@ -142,7 +142,7 @@ impl StoredReport {
                 .collect();
             if names.len() != 1 {
                 let message = format!(
-                    "the file has the reports of {} scenarios: {}",
+                    "the file contains the reports of {} scenarios: {}",
                     names.len(),
                     names.join(", ")
                 );
@@ -166,7 +166,7 @@ impl StoredReport {
         let foreign = |key: String, message: String| {
             Finding::new(&self.source, message)
                 .key(key)
-                .hint("give a report.json as `needlebench run` writes it, or its folder")
+                .hint("give a report.json written by `needlebench run`, or its folder")
         };
         let version = self.report.get("schema_version").and_then(Value::as_u64);
         match version {
@@ -174,8 +174,8 @@ impl StoredReport {
                 return Err(Finding::new(
                     &self.source,
                     format!(
-                        "the report has schema version {version}, but this program knows no newer \
-                         one than {SCHEMA_VERSION}"
+                        "the report has schema version {version}; this program supports up to \
+                         {SCHEMA_VERSION}"
                     ),
                 )
                 .key("schema_version")
@@ -185,20 +185,20 @@ impl StoredReport {
             _ => {
                 return Err(foreign(
                     "schema_version".to_owned(),
-                    "the file is no report: `schema_version` is missing".to_owned(),
+                    "the file is not a report: `schema_version` is missing".to_owned(),
                 ));
             }
         }
         let Some(goals) = self.report.get("goals").and_then(Value::as_array) else {
             return Err(foreign(
                 "goals".to_owned(),
-                "the file is no report of a run: it has no list `goals`".to_owned(),
+                "the file is not a report of a run: the list `goals` is missing".to_owned(),
             ));
         };
         let mut names = Vec::new();
         for (index, goal) in goals.iter().enumerate() {
             let missing = |key: String| {
-                let message = format!("the report is not whole: `{key}` is missing");
+                let message = format!("the report is incomplete: `{key}` is missing");
                 foreign(key, message)
             };
             let Some(name) = goal.get("name").and_then(Value::as_str) else {
@@ -271,8 +271,7 @@ impl StoredReport {
             .any(|metrics| metrics.get(key).is_some())
     }
 
-    /// Why it is not complete, if it is not: by its verdict, by what was not judged, and by engines that
-    /// failed.
+    /// Why it is not complete, if it is not: by its verdict, by what was not evaluated, and by engines that failed.
     pub(crate) fn incomplete(&self) -> Option<String> {
         let count = |key: &str| {
             self.report
@@ -289,11 +288,11 @@ impl StoredReport {
         let unjudged = count("not_judged");
         let why = match (unjudged, failed.is_empty()) {
             (0, true) if self.text("/verdict") != Some(Verdict::Incomplete.name()) => return None,
-            (0, true) => "its verdict says so".to_owned(),
+            (0, true) => "its verdict is incomplete".to_owned(),
             (0, false) => format!("{} failed", failed.join(", ")),
-            (_, true) => format!("{unjudged} criteria were not judged"),
+            (_, true) => format!("{unjudged} criteria were not evaluated"),
             (_, false) => format!(
-                "{unjudged} criteria were not judged, {} failed",
+                "{unjudged} criteria were not evaluated, {} failed",
                 failed.join(", ")
             ),
         };

@@ -1,6 +1,6 @@
 //! Largest losses that a comparison allows, of runs and of studies.
 
-use needlebench_cell::{digits_apart, nearest_name};
+use needlebench_input::{digits_apart, nearest_name};
 use needlebench_kinematics::ik::Configuration;
 
 use crate::metric::{MetricKey, Quantity};
@@ -176,7 +176,7 @@ fn subject(
             None => Ok(Subject::Rate(*rate)),
             Some(_) => Err(wrong(
                 format!("{name} has no quantiles"),
-                format!("leave out the `@`: {name}=0.02"),
+                format!("omit the `@`: {name}=0.02"),
             )),
         };
     }
@@ -195,7 +195,7 @@ fn unknown(name: &str, rates: &[Rate], engines: &[&str]) -> ThresholdError {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("the metrics are {}", names.join(", ")),
     };
-    wrong(format!("`{name}` is no metric"), hint)
+    wrong(format!("`{name}` is not a metric"), hint)
 }
 
 fn quantile(
@@ -208,7 +208,7 @@ fn quantile(
         (Compared::Runs, None) => Ok(None),
         (Compared::Runs, Some(_)) => Err(wrong(
             format!("a run has no quantiles of {name}"),
-            format!("leave out the `@`, such as {name}=5%; studies have quantiles"),
+            format!("omit the `@`, e.g. {name}=5%; studies have quantiles"),
         )),
         (Compared::Studies(_), None) => Ok(Some(match metric.more_is_better() {
             Some(true) => 0.05,
@@ -218,8 +218,8 @@ fn quantile(
             match text.trim_end_matches('%').trim().parse::<f64>() {
                 Ok(percent) if (0.0..=100.0).contains(&percent) => Ok(Some(percent / 100.0)),
                 _ => Err(wrong(
-                    format!("`{text}` is no percentage from 0 to 100"),
-                    format!("such as {name}@5 for the 5 % quantile"),
+                    format!("`{text}` is not a percentage from 0 to 100"),
+                    format!("e.g. {name}@5 for the 5th percentile"),
                 )),
             }
         }
@@ -243,8 +243,8 @@ fn configuration(
     };
     if of_layouts {
         return Err(wrong(
-            format!("that is of layouts, not of `{of}`"),
-            "leave out the `:` and what follows",
+            format!("this is a rate of layouts, not of `{of}`"),
+            "omit the `:` and what follows",
         ));
     }
     let mut known = vec![EVERY];
@@ -257,7 +257,7 @@ fn configuration(
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("one of {}", known.join(", ")),
     };
-    Err(wrong(format!("`{of}` is no configuration"), hint))
+    Err(wrong(format!("`{of}` is not a configuration"), hint))
 }
 
 /// The limit, and the unit that it is given in.
@@ -268,8 +268,8 @@ fn parse_limit(
 ) -> Result<(Loss, (&'static str, f64)), ThresholdError> {
     let units = quantity.units();
     let example = match quantity {
-        Quantity::Ratio => "such as 0.02, or 2% of the first value".to_owned(),
-        _ => format!("such as 0.5{0} or 5%", units[0].0),
+        Quantity::Ratio => "e.g. 0.02, or 2% of the first value".to_owned(),
+        _ => format!("e.g. 0.5{0} or 5%", units[0].0),
     };
     // The unit starts with the first letter that is none of a number such as `1e-3`.
     let end = text
@@ -285,7 +285,7 @@ fn parse_limit(
     };
     if !value.is_finite() || value < 0.0 {
         return Err(wrong(
-            format!("`{text}` is not a loss: it has to be finite and not negative"),
+            format!("`{text}` is not a loss: a finite, non-negative value is required"),
             example,
         ));
     }
@@ -392,8 +392,8 @@ mod tests {
             assert!(hint("clearance", wrong).contains("finite"), "{wrong}");
         }
         assert!(hint("clearance@5", "1mm").contains("a run has no quantiles"));
-        assert!(hint("clearance:best", "1mm").contains("`best` is no configuration"));
-        assert!(hint("success_rate", "0.1").contains("`success_rate` is no metric"));
+        assert!(hint("clearance:best", "1mm").contains("`best` is not a configuration"));
+        assert!(hint("success_rate", "0.1").contains("`success_rate` is not a metric"));
     }
 
     #[test]
@@ -443,7 +443,7 @@ mod tests {
             ),
             ("success_rate@5", "0.1", "no quantiles", "success_rate=0.02"),
             ("success_rate:best", "0.1", "`best`", ""),
-            ("working_layouts:every", "0.1", "of layouts", "leave out"),
+            ("working_layouts:every", "0.1", "of layouts", "omit"),
             ("success_rate", "1mm", "`mm` is not a unit", "0.02"),
         ] {
             let found = hint(key, limit, STUDIES);

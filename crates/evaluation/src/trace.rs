@@ -1,6 +1,6 @@
 //! The trace matrix: which requirement is stood for by which criterion, and what came of it.
 
-use needlebench_cell::requirements::{Requirements, requirement_of};
+use needlebench_scenario::requirements::{Requirements, requirement_of};
 
 use crate::report::{Report, TraceOutcome, TraceRow};
 

@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 
-/// One draw of the scenario's imperfections: real minus what the controller believes, world axes
-/// unless said.
+/// One draw of the scenario's imperfections: real minus what the controller assumes, world axes unless said.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TruthReport {
     /// The scenario's seed, which decides the draw.
@@ -18,7 +17,7 @@ pub struct TruthReport {
     pub encoder_offset_rad: Option<[f64; 6]>,
     /// Compliance of the gears.
     pub compliance_rad_per_nm: [f64; 6],
-    /// Friction over what the controller believes in.
+    /// Friction over what the controller assumes.
     pub friction_true_over_nominal: Option<[f64; 6]>,
     /// Registration error of the phantom at the world's origin: translation.
     pub phantom_shift_m: [f64; 3],

@@ -4,21 +4,21 @@ use serde::Serialize;
 
 /// Whether all criteria were met.
 ///
-/// What was missed is known, whatever else might have come out: `Fail` goes before `Incomplete`, and
-/// only what was judged as a whole passes.
+/// A failure is certain whatever else was not evaluated: `Fail` goes before `Incomplete`, and only what was evaluated
+/// as a whole passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// All were judged and met.
+    /// All were evaluated and met.
     Pass,
-    /// One was judged and not met.
+    /// One was evaluated and not met.
     Fail,
-    /// All that were judged were met, but something that was to be judged was not.
+    /// All that were evaluated were met, but something that was to be evaluated was not.
     Incomplete,
 }
 
 impl Verdict {
-    /// Of what was missed and what could not be judged.
+    /// From what failed and what could not be evaluated.
     pub fn of(missed: bool, unjudged: bool) -> Self {
         match (missed, unjudged) {
             (true, _) => Self::Fail,
@@ -37,7 +37,7 @@ impl Verdict {
     }
 }
 
-/// A criterion that was to be judged and could not be.
+/// A criterion that was to be evaluated and could not be.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct NotJudged {
     /// Goal.
@@ -55,7 +55,7 @@ pub struct NotJudged {
     pub requirement: Option<String>,
 }
 
-/// Criteria, as far as they could be judged.
+/// Criteria, as far as they could be evaluated.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Judged {
     /// Those that were.
@@ -71,7 +71,7 @@ impl Judged {
         Verdict::of(missed, !self.not_judged.is_empty())
     }
 
-    /// Adds a criterion on a value, which is not judged where there is none.
+    /// Adds a criterion on a value, which is not evaluated where there is none.
     pub fn add(&mut self, result: CriterionResult, reason: impl FnOnce() -> String) {
         if result.value.is_some_and(|value| !value.is_nan()) {
             self.results.push(result);
@@ -94,13 +94,13 @@ impl Judged {
     }
 }
 
-/// Why the criteria on what an engine measures are not judged where it did not.
+/// Why the criteria on what an engine measures are not evaluated where it did not.
 pub fn unmeasured_by(engine: &str) -> String {
-    format!("{engine} did not measure it")
+    format!("not measured by {engine}")
 }
 
-/// Why the criteria on what engines differ by are not judged where one is missing.
-pub const UNCOMPARED: &str = "not all engines measured it";
+/// Why the criteria on what engines differ by are not evaluated where one is missing.
+pub const UNCOMPARED: &str = "not measured by all engines";
 
 /// One criterion on one value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -128,20 +128,20 @@ pub struct CriterionResult {
     pub requirement: Option<String>,
 }
 
-/// What came of a criterion.
+/// Outcome of a criterion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TraceOutcome {
-    /// Wherever it was to be judged it was, and met.
+    /// Wherever it was to be evaluated it was, and met.
     Met,
-    /// It was missed somewhere.
+    /// It failed somewhere.
     Missed,
-    /// It was not missed, but not judged everywhere, or nowhere at all.
+    /// It did not fail, but was not evaluated everywhere, or nowhere at all.
     NotJudged,
 }
 
 impl TraceOutcome {
-    /// Of how often it was met, missed and not judged.
+    /// From how often it was met, failed and not evaluated.
     pub fn of(met: u64, missed: u64, not_judged: u64) -> Self {
         match (met, missed, not_judged) {
             (_, 1.., _) => Self::Missed,
@@ -154,8 +154,8 @@ impl TraceOutcome {
     pub fn words(self) -> &'static str {
         match self {
             Self::Met => "met",
-            Self::Missed => "missed",
-            Self::NotJudged => "not judged",
+            Self::Missed => "failed",
+            Self::NotJudged => "not evaluated",
         }
     }
 }
@@ -171,10 +171,10 @@ pub struct TraceRow {
     pub outcome: TraceOutcome,
     /// How often it was met, over goals, configurations and engines.
     pub met: u64,
-    /// How often it was missed.
+    /// How often it failed.
     pub missed: u64,
-    /// How often it was to be judged and could not be; 0 with nothing met nor missed: nothing of this run
-    /// was to be judged by it.
+    /// How often it was to be evaluated and could not be; 0 with nothing met nor missed: nothing of this run was to be
+    /// evaluated by it.
     pub not_judged: u64,
 }
 

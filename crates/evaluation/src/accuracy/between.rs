@@ -52,7 +52,7 @@ pub struct Tested {
 /// Why there is nothing to test.
 pub(crate) fn kruskal_wallis(groups: &[Vec<f64>]) -> Result<Tested, &'static str> {
     if groups.len() < 2 {
-        return Err("there is one group");
+        return Err("there is only one group");
     }
     let members = groups.iter().map(Vec::len).min().unwrap_or(0);
     if members < LEAST_MEMBERS {
@@ -71,7 +71,7 @@ pub(crate) fn kruskal_wallis(groups: &[Vec<f64>]) -> Result<Tested, &'static str
     let statistic = 12.0 / (n * (n + 1.0)) * sum - 3.0 * (n + 1.0);
     let correction = 1.0 - ties / (n.powi(3) - n);
     if correction <= 0.0 {
-        return Err("all values are the same");
+        return Err("all values are equal");
     }
     Ok(Tested {
         test: Test::KruskalWallis,
@@ -90,7 +90,7 @@ pub(crate) fn friedman(blocks: &[Vec<f64>]) -> Result<Tested, &'static str> {
         return Err("fewer than 10 draws have a value in every group");
     }
     if groups < 2 {
-        return Err("there is one group");
+        return Err("there is only one group");
     }
     let (b, k) = (blocks.len() as f64, groups as f64);
     let mut sums = vec![0.0; groups];
@@ -106,7 +106,7 @@ pub(crate) fn friedman(blocks: &[Vec<f64>]) -> Result<Tested, &'static str> {
     let statistic = 12.0 / (b * k * (k + 1.0)) * squares - 3.0 * b * (k + 1.0);
     let correction = 1.0 - all_ties / (b * (k.powi(3) - k));
     if correction <= 0.0 {
-        return Err("all values are the same");
+        return Err("all values are equal");
     }
     Ok(Tested {
         test: Test::Friedman,

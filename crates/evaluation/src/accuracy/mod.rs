@@ -16,7 +16,7 @@ pub(crate) use between::{friedman, kruskal_wallis};
 pub use spread::Spread;
 
 use crate::metric::{Metric, MetricKey, Unit};
-use needlebench_cell::study::StudyMode;
+use needlebench_scenario::study::StudyMode;
 
 /// A column of the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -237,7 +237,7 @@ pub fn summarise(
     let all = row("all", &|_| true);
     let tests = std::array::from_fn(|index| {
         if !QUANTITIES[index].is_tested {
-            return Err("it is planned, not measured".to_owned());
+            return Err("planned, not measured".to_owned());
         }
         match drawn {
             Drawn::Nothing(why) => Err(why.clone()),
@@ -267,7 +267,7 @@ fn compare(groups: usize, samples: &[Sample], quantity: usize) -> Result<Tested,
         .collect();
     let present: Vec<usize> = seen.into_iter().collect();
     if present.is_empty() {
-        return Err("it was not measured");
+        return Err("not measured");
     }
     let mean = |sums: &[(f64, u32)], group: usize| {
         let (sum, count) = sums[group];

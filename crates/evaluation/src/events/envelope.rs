@@ -1,9 +1,10 @@
 //! How far a stop at any moment of a motion goes.
 
-use needlebench_cell::{Cell, Goal};
+use needlebench_cell::Cell;
 use needlebench_engine::Brakes;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_kinematics::{Dynamics, Joints};
+use needlebench_scenario::Goal;
 use serde::Serialize;
 
 use crate::needle::tip_of;

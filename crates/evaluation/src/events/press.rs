@@ -1,11 +1,11 @@
-//! A contact that was asked for.
+//! A prescribed contact.
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::Goal;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::Recording;
 use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_scenario::Goal;
 use serde::Serialize;
 
 use crate::contact::{
@@ -18,10 +18,10 @@ use crate::needle::tip_of;
 const RIPPLE_S: f64 = 0.05;
 
 /// What the forces of a staged contact mean, in the words of reports.
-pub const RIGID_FORCE_MEANS: &str = "servo stiffness times depth, against a rigid surface: not the force on a patient, \
-                                     whose tissue yields";
+pub const RIGID_FORCE_MEANS: &str = "servo stiffness times depth, on a rigid surface; not the force on a patient, whose tissue \
+     yields";
 
-/// A contact that was asked for, in all engines.
+/// A prescribed contact, in all engines.
 ///
 /// The phantom is rigid and so are table and gantry. What an arm that is commanded a depth into them presses with is
 /// the stiffness of its servo times that depth: a check of engines and torques, and no force on a patient.

@@ -1,10 +1,11 @@
-//! The way back out along the needle.
+//! The retreat along the needle.
 
 use nalgebra::Vector3;
-use needlebench_cell::{Cell, Goal};
+use needlebench_cell::Cell;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::Recording;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
+use needlebench_scenario::Goal;
 use serde::Serialize;
 
 use crate::clearance::{certify_recording, measure_clearance};
@@ -12,12 +13,12 @@ use crate::contact::ContactEpisode;
 use crate::needle::tip_of;
 use crate::report::ClearanceReport;
 
-/// The way back in one engine.
+/// The retreat in one engine.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RetractionEngineReport {
     /// Length of the needle that lies in the patient at the start, m: from entry point to target.
     pub inserted_length_m: f64,
-    /// Length of the straight way back, m.
+    /// Length of the linear retreat, m.
     pub straight_length_m: f64,
     /// Whether the straight way is as long as the inserted length. Where it is not, the needle has to
     /// be drawn by hand before the arm turns off.
@@ -35,11 +36,11 @@ pub struct RetractionEngineReport {
     pub duration_s: f64,
     /// Contacts on the way.
     pub contacts: Vec<ContactEpisode>,
-    /// Least clearances on the way, with their proven bounds.
+    /// Least clearances on the way, with their certified bounds.
     pub clearance: ClearanceReport,
 }
 
-/// Measures a way back.
+/// Measures a retreat.
 pub fn measure_retraction(
     cell: &Cell,
     model: &ClearanceModel,

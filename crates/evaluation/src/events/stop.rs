@@ -1,9 +1,10 @@
 //! A stop in one engine.
 
-use needlebench_cell::{Cell, Goal};
+use needlebench_cell::Cell;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::Recording;
 use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_scenario::Goal;
 use serde::Serialize;
 
 use crate::clearance::{certify_recording, measure_clearance};
@@ -29,7 +30,7 @@ pub struct StopEngineReport {
     pub off_path_m: f64,
     /// Contacts from the trigger on.
     pub contacts: Vec<ContactEpisode>,
-    /// Least clearances from the trigger on, with their proven bounds.
+    /// Least clearances from the trigger on, with their certified bounds.
     pub clearance: ClearanceReport,
 }
 

@@ -1,7 +1,7 @@
 //! What is declared of a metric.
 
-use needlebench_cell::scenario::CriteriaSection;
-use needlebench_cell::study::StudyMode;
+use needlebench_scenario::scenario::CriteriaSection;
+use needlebench_scenario::study::StudyMode;
 
 use super::quantity::{Quantity, Unit};
 use crate::report::{ConfigurationReport, EngineReport};
@@ -31,7 +31,7 @@ pub enum Bound {
 pub enum Draw {
     /// The nominal ones, whatever the imperfections.
     Nominal,
-    /// Those that the scenario's seed draws from its imperfections.
+    /// The one draw from the scenario's imperfections that its seed gives.
     ThisDraw,
     /// All that the imperfections describe.
     OverBudget,
@@ -86,15 +86,14 @@ pub struct Heading {
 /// What a criterion makes of a value that is missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Missing {
-    /// It was to be measured: the criterion is not judged.
+    /// It was to be measured: the criterion is not evaluated.
     Unjudged,
-    /// It was looked for and never came, as the time of settling of what does not settle: the criterion
-    /// is missed.
+    /// It was looked for and never came, as the time of settling of what does not settle: the criterion fails.
     Never,
     /// There is nothing to measure: the criterion says nothing.
     Skips,
-    /// Several engines were to be compared: the criterion is not judged. With one engine it says nothing,
-    /// whatever the value.
+    /// Several engines were to be compared: the criterion is not evaluated. With one engine it says nothing, whatever
+    /// the value.
     UnjudgedIfCompared,
 }
 
@@ -105,7 +104,7 @@ pub struct Criterion {
     pub key: &'static str,
     /// The limit in SI units; none where the scenario has none.
     pub limit: fn(&CriteriaSection) -> Option<f64>,
-    /// Cases that are judged by this metric; a run is judged as a dynamic case.
+    /// Cases that are evaluated by this metric; a run is evaluated as a dynamic case.
     pub modes: &'static [StudyMode],
     /// What a missing value means.
     pub missing: Missing,
@@ -140,7 +139,7 @@ pub struct Statistics {
     pub by_case: bool,
     /// What it stands for; of several columns that a row has the last counts.
     pub role: Option<Role>,
-    /// Key of a study's `[criteria]` that is judged by it.
+    /// Key of a study's `[criteria]` that is evaluated by it.
     pub criterion: Option<&'static str>,
     /// Whether, and how finely, it is on the study's page.
     pub page: Option<Precision>,
@@ -217,9 +216,9 @@ pub struct Metric {
     pub stage: Stage,
     /// Name that it shares with metrics of the same thing that are known otherwise.
     pub family: &'static str,
-    /// Name of the same number of a static case's posture, which need not be that of a run: it is the
-    /// one that a plan would try first, without whole turns. The same as `key` where the posture does
-    /// not matter; none if static cases do not measure it.
+    /// Name of the same number of a static case's posture, which need not be that of a run: it is the one that a plan
+    /// would try first, without 2π equivalents. The same as `key` where the posture does not matter; none if static
+    /// cases do not measure it.
     pub static_key: Option<&'static str>,
     /// Studies that have columns of it, beside static ones; none for those of its stage.
     pub modes: Option<&'static [StudyMode]>,
@@ -543,28 +542,28 @@ impl Metric {
     pub(super) fn basis(&self) -> String {
         let motion = match (self.bound, self.stage) {
             (Bound::Certified, Stage::PlannedMotion) => {
-                "proven lower bound over the whole planned motion"
+                "certified lower bound over the whole planned motion"
             }
             (Bound::Certified, _) => {
-                "proven lower bound over the whole simulated motion, over the engines"
+                "certified lower bound over the whole simulated motion, over all engines"
             }
             (Bound::Attained, Stage::PlannedMotion) => {
-                "nearest approach that was found along the planned motion"
+                "nearest approach found along the planned motion"
             }
             (Bound::Attained, Stage::Simulated) => {
-                "nearest approach that was found along the simulated motion, over the engines"
+                "nearest approach found along the simulated motion, over all engines"
             }
-            (_, Stage::FinalPosture) => "of the final posture, without engines",
+            (_, Stage::FinalPosture) => "of the final posture, without simulation",
             (_, Stage::PlannedMotion) => "of the planned motion",
             (_, Stage::Simulated) => match self.source {
-                Source::Engines(_) => "simulated, the worst of the engines",
+                Source::Engines(_) => "simulated, worst engine",
                 Source::Configuration(_) => "simulated",
             },
         };
         let draw = match self.draw {
             Draw::Nominal => "",
-            Draw::ThisDraw => "; of the arm and patient that the seed draws",
-            Draw::OverBudget => "; over all arms and patients of [imperfections]",
+            Draw::ThisDraw => "; of the arm and patient sampled by the seed",
+            Draw::OverBudget => "; over the arm and patient population",
         };
         format!("{motion}{draw}")
     }

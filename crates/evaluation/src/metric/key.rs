@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
-use needlebench_cell::study::StudyMode;
+use needlebench_scenario::study::StudyMode;
 
 use super::entry::{Better, Metric, Source, Stage, Statistics};
 use super::metrics;
@@ -151,7 +151,8 @@ impl MetricKey {
             Of::StaticCase => {
                 let basis = metric.basis();
                 let draw = basis.split_once("; ").map_or("", |(_, draw)| draw);
-                let posture = "of the posture that a plan would try first, without whole turns";
+                let posture =
+                    "of the posture that a plan would try first, without 2 pi equivalents";
                 format!("{posture}; {draw}")
                     .trim_end_matches("; ")
                     .to_owned()

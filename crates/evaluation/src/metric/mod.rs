@@ -1,10 +1,10 @@
-//! The metrics: every number by which configurations are judged, ranked and compared, declared once.
+//! The metrics: every number by which configurations are evaluated, ranked and compared, declared once.
 //!
-//! A metric is an entry of the [table](GROUPS): what it is called, what exactly it is, and how it is read
-//! from a configuration's part of the report. All else is made from the table: rows and columns of
-//! studies, criteria, rankings and Pareto sets, thresholds of comparisons, headings of tables and
-//! pages. One name is one thing: a proven bound and a nearest approach, one draw of the imperfections
-//! and all of them, a posture, a planned motion and a simulated one are different metrics.
+//! A metric is an entry of the [table](GROUPS): what it is called, what exactly it is, and how it is read from a
+//! configuration's part of the report. All else is made from the table: rows and columns of studies, criteria, rankings
+//! and Pareto sets, thresholds of comparisons, headings of tables and pages. One name is one thing: a certified bound
+//! and a nearest approach, one draw of the imperfections and all of them, a posture, a planned motion and a simulated
+//! one are different metrics.
 //!
 //! What is missing or not finite was *not measured*, and is never taken for 0.
 
@@ -35,7 +35,7 @@ pub fn metrics() -> impl DoubleEndedIterator<Item = &'static Metric> {
 mod tests {
     use std::collections::BTreeSet;
 
-    use needlebench_cell::ranking::{RankingSection, less_is_better};
+    use needlebench_scenario::ranking::{RankingSection, less_is_better};
 
     use super::*;
 

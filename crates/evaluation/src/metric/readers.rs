@@ -13,7 +13,7 @@ pub(super) enum Motion {
     Planned,
 }
 
-/// Classes of physical bodies that nobody wants near each other.
+/// Classes of physical bodies whose clearance counts.
 pub(super) fn unwanted() -> impl Iterator<Item = ClearanceClass> {
     ClearanceClass::ALL
         .into_iter()
@@ -43,7 +43,7 @@ fn along(
     (is_of == motion).then_some(found)
 }
 
-/// The least proven bound over classes; none unless all that the report has are proven.
+/// The least certified bound over classes; none unless all in the report are certified.
 pub(super) fn certified(
     report: &ConfigurationReport,
     classes: impl Iterator<Item = ClearanceClass>,
@@ -90,7 +90,7 @@ pub(super) fn nearest(report: &ConfigurationReport, class: ClearanceClass) -> St
     })
 }
 
-/// Moments of the needle's tip at the target over all arms and patients.
+/// Moments of the needle's tip at the target over the arm and patient population.
 pub(super) fn budget(report: &ConfigurationReport) -> Option<&Moments> {
     let budget = report.budget.as_ref()?;
     Some(&budget.total.at_target.analytic)
@@ -135,14 +135,14 @@ pub(super) fn contact_force(engine: &EngineReport) -> f64 {
     }
 }
 
-/// What touched first.
+/// The first contact.
 pub(super) fn first_contact(engine: Option<&EngineReport>) -> String {
     let contact = engine.map(|engine| &engine.motion.contact);
     let pair = contact.and_then(|contact| Some((contact, contact.first_pair.as_ref()?)));
     pair.map_or(String::new(), |(contact, [a, b])| {
         let time_s = contact.first_time_s.unwrap_or(0.0);
         let (a, b) = (part_in_words(a), part_in_words(b));
-        format!("{a} touches {b} at {time_s:.2} s")
+        format!("contact of {a} with {b} at {time_s:.2} s")
     })
 }
 

@@ -42,7 +42,7 @@ pub fn resolve(
         None => itself,
         Some(key) => {
             let note = format!(
-                "`{}` was not measured: compared by `{}` ({})",
+                "`{}` was not measured; compared by `{}` instead ({})",
                 wanted.key(),
                 key.key(),
                 key.description()

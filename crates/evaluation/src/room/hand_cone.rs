@@ -28,7 +28,7 @@ pub struct HandCone {
     pub blocker: Option<String>,
 }
 
-/// Part of the half ball: ranges of distance, angle from the axis and angle about it.
+/// Part of the hemisphere: ranges of distance, angle from the axis and angle about it.
 #[derive(Debug, Clone)]
 struct Cell {
     distance_m: [f64; 2],

@@ -14,10 +14,11 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::people::{ElbowPreference, Handedness, PatientSides, Person, Side};
-use needlebench_cell::{BodyKind, Goal, ResolvedScenario};
+use needlebench_cell::BodyKind;
 use needlebench_geometry::{PreparedShape, Shape, separation};
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_scenario::people::{ElbowPreference, Handedness, PatientSides, Person, Side};
+use needlebench_scenario::{Goal, ResolvedScenario};
 use serde::Serialize;
 
 pub use grid::VoxelGrid;
@@ -27,8 +28,8 @@ pub use obstacles::{Obstacles, PlacedObstacles, SightLines};
 pub use sector::Sector;
 pub use sight::{ENTRY_DISC_HEIGHT_M, Sight, SightTargets, measure_sight, sight_segments};
 
-/// Radius of the half ball about the entry point that is asked for free space, m: as far as a
-/// forearm with a hand reaches.
+/// Radius of the hemisphere about the entry point in which free space is measured, m: as far as a forearm with a hand
+/// reaches.
 pub const SECTOR_RADIUS_M: f64 = 0.35;
 /// Points nearer to arm or tool than this are not free, m: half of a hand's breadth.
 pub(crate) const FREE_MARGIN_M: f64 = 0.05;
@@ -38,19 +39,18 @@ pub const VOXEL_M: f64 = 0.02;
 /// What one configuration leaves to the people in the room, in its final posture.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct RoomReport {
-    /// Share of the half ball of 0.35 m on the outer side of the skin at the entry point that is
-    /// farther than 0.05 m from arm and tool; what phantom, table, gantry, mount and obstacles fill does not
-    /// count. By cubes of 20 mm.
+    /// Share of the hemisphere of 0.35 m on the outer side of the skin at the entry point that is farther than 0.05 m
+    /// from arm and tool; what phantom, table, gantry, mount and obstacles fill does not count. By cubes of 20 mm.
     pub free_fraction: f64,
-    /// The same by region, which share out the half ball: `above` and the patient's level sides.
-    /// Empty without a patient.
+    /// The same by region, which share out the hemisphere: `above` and the patient's level sides. Empty without a
+    /// patient.
     pub regions: BTreeMap<&'static str, f64>,
     /// Sight of each person in each stature.
     pub sight: Vec<SightReport>,
-    /// Mean of `sight` over the people on the preferred side, over all if nobody stands there.
+    /// Mean of `sight` over the people on the preferred side, over all if there are none.
     pub sight_fraction: f64,
-    /// Half-angle of the largest cone behind the guide, about the needle, that is free of arm, tool
-    /// and surroundings; a proven lower bound, at most a right angle.
+    /// Half-angle of the largest cone behind the guide, about the needle, that is free of arm, tool and surroundings; a
+    /// certified lower bound, at most a right angle.
     pub hand_cone_half_angle_rad: f64,
     /// How much larger the true angle may be, at most: proven by a point inside a solid.
     pub hand_cone_accuracy_rad: f64,
@@ -110,7 +110,7 @@ pub struct RoomModel<'a> {
     resolved: &'a ResolvedScenario,
     obstacles: Obstacles<'a>,
     sides: Option<PatientSides>,
-    /// Of each goal, made when it is first asked for.
+    /// Of each goal, made on first use.
     sectors: Vec<OnceLock<Sector>>,
     /// Points all over the arm: body and place in it, m.
     surface: Vec<(usize, Vec<Point3<f64>>)>,
@@ -153,7 +153,7 @@ impl<'a> RoomModel<'a> {
         }
     }
 
-    /// The half ball about the entry point of a goal.
+    /// The hemisphere about the entry point of a goal.
     pub fn sector(&self, goal: usize) -> &Sector {
         self.sectors[goal].get_or_init(|| {
             let placed = &self.resolved.goals[goal];
@@ -202,7 +202,7 @@ impl<'a> RoomModel<'a> {
         }
     }
 
-    /// Length of the hand's cone, m: as the needle corridor.
+    /// Length of the hand cone, m: that of the access zone.
     pub(crate) fn hand_reach_m(&self) -> f64 {
         self.resolved
             .scenario
@@ -410,7 +410,7 @@ fn edge_points(
 mod tests {
     use std::path::Path;
 
-    use needlebench_cell::{Overrides, load_scenario};
+    use needlebench_scenario::{Overrides, load_scenario};
 
     use super::*;
 

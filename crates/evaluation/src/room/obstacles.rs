@@ -38,7 +38,7 @@ struct Placed<'o> {
 }
 
 impl<'c> Obstacles<'c> {
-    /// All solids of the cell but the needle corridor, which is none, and people, who are those that look.
+    /// All solids of the cell except the access zone, which is no obstacle, and the people, whose view is evaluated.
     pub fn new(cell: &'c Cell) -> Self {
         let mut solids = Vec::new();
         for (index, body) in cell.bodies.iter().enumerate() {

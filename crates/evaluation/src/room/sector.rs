@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::people::PatientSides;
+use needlebench_scenario::people::PatientSides;
 
 use super::grid::VoxelGrid;
 use super::obstacles::PlacedObstacles;
@@ -32,7 +32,7 @@ pub(super) const ABOVE: &str = "above";
 const LEAST_VOXELS: usize = 100;
 
 impl Sector {
-    /// The half ball, less the voxels whose centre is in the surroundings.
+    /// The hemisphere, less the voxels whose centre is in the surroundings.
     ///
     /// Its regions share it out: a voxel belongs to the direction, of the patient's four level sides
     /// and up, that its offset from the entry point follows most. Without a patient there is but

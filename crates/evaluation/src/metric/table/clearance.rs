@@ -1,4 +1,4 @@
-//! Clearances: the least over some classes, and of each class.
+//! Clearances: the minimum over some classes, and of each class.
 
 #![expect(
     clippy::large_types_passed_by_value,
@@ -6,7 +6,7 @@
 )]
 
 use needlebench_cell::ClearanceClass;
-use needlebench_cell::study::StudyMode::{self, Dynamic, Planned, Static};
+use needlebench_scenario::study::StudyMode::{self, Dynamic, Planned, Static};
 
 use super::{ALL, CLEARANCE_RESOLUTION_M, MM, MOVING};
 use crate::metric::entry::Better::More;
@@ -21,9 +21,9 @@ use crate::metric::readers::{
     Motion, attained, certified, nearest, of_posture, surroundings, unwanted,
 };
 
-/// One clearance as it is known in five ways: of the final posture, or of a static case's; along the
-/// planned motion as the nearest approach and as a proven bound; and along the simulated one likewise.
-/// `$with` adds what is the family's own.
+/// One clearance as it is known in five ways: of the final posture, or of a static case's; along the planned motion as
+/// the nearest approach and as a certified bound; and along the simulated one likewise. `$with` adds what is the
+/// family's own.
 macro_rules! clearance {
     ($stem:literal, $words:literal, $definition:literal, $classes:expr, $with:ident) => {
         &[
@@ -43,7 +43,7 @@ macro_rules! clearance {
             $with(
                 Metric::new(
                     concat!($stem, "_planned_attained"),
-                    concat!($words, ", nearest of the plan"),
+                    concat!($words, ", attained in the plan"),
                     $definition,
                     Length,
                     Configuration(|each| attained(each, $classes, Motion::Planned)),
@@ -56,7 +56,7 @@ macro_rules! clearance {
             $with(
                 Metric::new(
                     concat!($stem, "_planned"),
-                    concat!($words, ", proven of the plan"),
+                    concat!($words, ", certified in the plan"),
                     $definition,
                     Length,
                     Configuration(|each| certified(each, $classes, Motion::Planned)),
@@ -69,7 +69,7 @@ macro_rules! clearance {
             $with(
                 Metric::new(
                     concat!($stem, "_attained"),
-                    concat!($words, ", nearest"),
+                    concat!($words, ", attained"),
                     $definition,
                     Length,
                     Configuration(|each| attained(each, $classes, Motion::Simulated)),
@@ -147,7 +147,7 @@ const fn in_case(metric: Metric, place: u8, heading: &'static str) -> Metric {
     }
 }
 
-/// What ranks by the simulated motion: its proven bound, or its nearest approach where nothing is
+/// What ranks by the simulated motion: its certified bound, or its nearest approach where nothing is
 /// proven.
 const fn ranked(metric: Metric, key: &'static str) -> Metric {
     match metric.stage {
@@ -175,30 +175,30 @@ pub(super) const CLEARANCE: &[Metric] = {
                 .table(9, "clearance\n(mm)")
                 .summary(2, "Clearance (mm)")
                 .page_side(1, "Clearance"),
-            (Certified, Simulated) => metric.page(12, "Proven clearance"),
+            (Certified, Simulated) => metric.page(12, "Certified clearance"),
             _ => metric,
         };
-        ranked(in_case(metric, 0, "clear\nmm"), "clearance_mm")
+        ranked(in_case(metric, 0, "clearance\nmm"), "clearance_mm")
     }
     clearance!(
         "clearance",
         "clearance",
-        "least of the clearances of arm and tool from phantom, table, gantry, mount and obstacles, \
-         without the guide's stand-off and the arm's own",
+        "minimum clearance of arm and tool from phantom, table, gantry, mount and obstacles, \
+         without guide stand-off and self-clearance",
         surroundings(),
         with
     )
 };
 
 pub(super) const LEAST_CLEARANCE: &[Metric] = {
-    // The arm's own links are near each other by its build: no table leads with that.
+    // The arm's own links are close to each other by design: no table leads with that.
     const fn with(metric: Metric) -> Metric {
         metric
     }
     clearance!(
         "least_clearance",
-        "least clearance",
-        "least clearance of all bodies, of the arm from itself too, without the guide's stand-off",
+        "minimum clearance",
+        "minimum clearance of all bodies, including self-clearance, without guide stand-off",
         unwanted(),
         with
     )
@@ -302,14 +302,18 @@ pub(super) const SELF_CLEARANCE: &[Metric] = {
             (Certified, _) => metric.statistics(Statistics::SPREAD),
             _ => metric.statistics(nearest),
         };
-        let metric = headed(metric, Some((8, "arm to\nitself (mm)")), (7, "From itself"));
+        let metric = headed(
+            metric,
+            Some((8, "self-clearance\n(mm)")),
+            (7, "Self-clearance"),
+        );
         ranked(in_case(metric, 1, "self\nmm"), "self_clearance_mm")
     }
     clearance_of_class!(
         SelfCollision,
         "self_clearance",
-        "clearance from itself",
-        "clearance of arm and tool from themselves",
+        "self-clearance",
+        "clearance between the links of arm and tool",
         "min_clearance_mm.self",
         self_collision,
         with
@@ -350,33 +354,34 @@ pub(super) const NEEDLE_CORRIDOR: &[Metric] = {
     const fn with(metric: Metric) -> Metric {
         let metric = headed(
             metric,
-            Some((7, "behind\nguide (mm)")),
-            (10, "Behind the guide"),
+            Some((7, "access\nclearance (mm)")),
+            (10, "Access clearance"),
         );
         let metric = match (metric.bound, metric.stage) {
-            (Attained, Simulated) => metric.summary(4, "Behind the guide (mm)"),
+            (Attained, Simulated) => metric.summary(4, "Access clearance (mm)"),
             _ => metric,
         };
-        ranked(in_case(metric, 2, "corridor\nmm"), "needle_corridor_mm")
+        ranked(in_case(metric, 2, "access\nmm"), "needle_corridor_mm")
     }
     clearance_of_class!(
         NeedleCorridor,
         "needle_corridor",
-        "space behind the guide",
-        "clearance of the volume behind the guide that needle and hand need, while the arm holds",
+        "access clearance",
+        "clearance of the access zone behind the guide, which needle and hand require, during the \
+         hold",
         "min_clearance_mm.needle_corridor",
         needle_corridor,
         with
     )
 };
 
-/// What the planned motion keeps of the clearance that its posture allows, and the way back.
+/// Margins of the planned motion, of those that its posture allows, and the clearance of the retreat.
 pub(super) const MARGIN: &[Metric] = &[
     Metric::new(
         "margin_attainable",
-        "margin, attainable",
-        "least clearance beyond what is judged, from phantom, table, gantry, mount and obstacles, of the postures that \
-         every motion takes: the start, the approach and its end",
+        "attainable margin",
+        "minimum clearance from phantom, table, gantry, mount and obstacles in excess of the \
+         required one, over the postures common to all motions: start, approach and its end",
         Length,
         Configuration(|each| each.margin.as_ref()?.attainable_m),
     )
@@ -384,8 +389,9 @@ pub(super) const MARGIN: &[Metric] = &[
     .better(More, CLEARANCE_RESOLUTION_M),
     Metric::new(
         "margin_planned",
-        "margin of the plan",
-        "least clearance beyond what is judged, from phantom, table, gantry, mount and obstacles",
+        "achieved margin",
+        "minimum clearance from phantom, table, gantry, mount and obstacles in excess of the \
+         required one, over the planned motion",
         Length,
         Configuration(|each| each.margin.as_ref()?.achieved_m),
     )
@@ -393,8 +399,9 @@ pub(super) const MARGIN: &[Metric] = &[
     .better(More, CLEARANCE_RESOLUTION_M),
     Metric::new(
         "clearance_retreat",
-        "clearance, way back",
-        "least of the clearances of arm and tool from phantom, table, gantry, mount and obstacles on the way back",
+        "clearance, retreat",
+        "minimum clearance of arm and tool from phantom, table, gantry, mount and obstacles during \
+         the retreat",
         Length,
         Configuration(|each| {
             let classes = &each.retreat_clearance.classes;
@@ -417,7 +424,7 @@ pub(super) const NEEDLE_ROUTE: &[Metric] = &[Metric::new(
 )
 .in_static_cases("needle_route")
 .better(More, CLEARANCE_RESOLUTION_M)
-.page(11, "Needle route")
+.page(11, "Needle path")
 .criterion("min_clearance_mm.needle_route", ALL, |criteria| {
     criteria.min_clearance_mm.needle_route.map(|mm| mm * MM)
 })

@@ -1,6 +1,6 @@
-//! Time and effort, contact, and how far the engines are apart.
+//! Time and effort, contact, and differences between engines.
 
-use needlebench_cell::study::StudyMode::Dynamic;
+use needlebench_scenario::study::StudyMode::Dynamic;
 
 use super::{MM, NEEDLE_RESOLUTION_M, SHARE_RESOLUTION};
 use crate::metric::entry::Better::Less;
@@ -13,7 +13,7 @@ use crate::metric::quantity::Quantity::{Force, Length, Ratio, Time};
 use crate::metric::quantity::Unit;
 use crate::metric::readers::{arrival_s, contact_force, first_contact};
 
-/// Shortest time that anybody at the table would notice.
+/// Shortest time that people at the table would notice.
 const TIME_RESOLUTION_S: f64 = 0.05;
 
 /// Time and effort.
@@ -21,7 +21,7 @@ pub(super) const EFFORT: &[Metric] = &[
     Metric::new(
         "motion_time",
         "motion time",
-        "time until the arm stands in its place, without the hold",
+        "time until the arm reaches its final posture, without the hold",
         Time,
         Configuration(arrival_s),
     )
@@ -34,7 +34,7 @@ pub(super) const EFFORT: &[Metric] = &[
     Metric::new(
         "settling_time",
         "settling time",
-        "time from the end of the motion until the tip stays within its band",
+        "time from the end of the motion until the tip remains within the settling band",
         Time,
         Engines(|each| each.motion.settling_time_s),
     )
@@ -47,8 +47,8 @@ pub(super) const EFFORT: &[Metric] = &[
     .detail(|_, _, criteria| format!("into a band of {:.4} mm", criteria.settling_band_mm)),
     Metric::new(
         "peak_torque",
-        "peak torque of limit",
-        "largest share of a joint's torque limit that is used",
+        "peak torque ratio",
+        "largest ratio of a joint's torque to its limit",
         Ratio,
         Engines(|each| Some(each.motion.peak_torque_ratio)),
     )
@@ -57,14 +57,14 @@ pub(super) const EFFORT: &[Metric] = &[
     .better(Less, SHARE_RESOLUTION)
     .ranked("peak_torque_ratio")
     .show(Show::Percent)
-    .engines(4, "torque\nof limit")
+    .engines(4, "peak torque\nratio")
     .criterion("max_peak_torque_ratio", &[Dynamic], |criteria| {
         criteria.max_peak_torque_ratio
     }),
     Metric::new(
         "peak_speed",
-        "peak speed of limit",
-        "largest share of a joint's speed limit that is used",
+        "peak speed ratio",
+        "largest ratio of a joint's speed to its limit",
         Ratio,
         Engines(|each| Some(each.motion.peak_speed_ratio)),
     )
@@ -75,8 +75,8 @@ pub(super) const EFFORT: &[Metric] = &[
     Metric::new(
         "contact_force",
         "peak contact force",
-        "largest sum of normal forces between arm, tool and what stands around them, all of it rigid: not \
-         the force on a patient",
+        "largest sum of normal contact forces between arm and tool and their surroundings, all \
+         rigid; not the force on a patient",
         Force,
         Engines(|each| Some(contact_force(each))),
     )
@@ -89,7 +89,7 @@ pub(super) const EFFORT: &[Metric] = &[
     Metric::new(
         "tracking_error",
         "peak tracking error",
-        "largest distance of the needle's tip from its reference at the same time",
+        "largest distance of the needle tip from its reference at the same time",
         Length,
         Engines(|each| Some(each.motion.peak_tracking_error_m)),
     )
@@ -99,12 +99,12 @@ pub(super) const EFFORT: &[Metric] = &[
     .engines(3, "tracking\npeak"),
 ];
 
-/// How far the engines are apart.
+/// Differences between engines.
 pub(super) const ENGINES_COMPARED: &[Metric] = &[
     Metric::new(
         "engine_difference_peak",
-        "engines differ, peak",
-        "largest difference of the engines' tips while moving",
+        "engine difference, peak",
+        "largest distance between the engines' needle tips during the motion",
         Length,
         Configuration(|each| Some(each.engine_difference?.peak_tip_m)),
     )
@@ -112,16 +112,16 @@ pub(super) const ENGINES_COMPARED: &[Metric] = &[
     .known(Value, ThisDraw, Simulated)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .engines(1, "engines differ\npeak")
-    .page(21, "Engines apart")
+    .engines(1, "engine difference\npeak")
+    .page(21, "Engine difference")
     .criterion("max_engine_difference_peak_mm", &[Dynamic], |criteria| {
         criteria.max_engine_difference_peak_mm.map(|mm| mm * MM)
     })
     .missing(Missing::UnjudgedIfCompared),
     Metric::new(
         "engine_difference_settled",
-        "engines differ, settled",
-        "difference of the engines' settled tips",
+        "engine difference, settled",
+        "distance between the engines' settled needle tips",
         Length,
         Configuration(|each| Some(each.engine_difference?.settled_tip_m)),
     )
@@ -130,7 +130,7 @@ pub(super) const ENGINES_COMPARED: &[Metric] = &[
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
     .engines(2, "\nsettled")
-    .summary(6, "Engines differ, settled")
+    .summary(6, "Engine difference, settled")
     .criterion("max_engine_difference_settled_mm", &[Dynamic], |criteria| {
         criteria.max_engine_difference_settled_mm.map(|mm| mm * MM)
     })

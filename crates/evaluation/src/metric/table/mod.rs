@@ -9,11 +9,11 @@ mod needle;
 mod people;
 mod posture;
 
-use needlebench_cell::study::StudyMode::{self, Dynamic, Planned, Static};
+use needlebench_scenario::study::StudyMode::{self, Dynamic, Planned, Static};
 
 use super::entry::Metric;
 
-/// Assumed: less than anybody would move a robot for.
+/// Assumed: too little to move a robot for.
 const CLEARANCE_RESOLUTION_M: f64 = 0.5e-3;
 /// Far below what any needle robot reaches, far above the rounding of two engines.
 const NEEDLE_RESOLUTION_M: f64 = 1e-6;
@@ -22,7 +22,7 @@ const SHARE_RESOLUTION: f64 = 0.01;
 
 const MM: f64 = 1e-3;
 
-/// Cases that are judged without engines.
+/// Cases that are evaluated without engines.
 const UNSIMULATED: &[StudyMode] = &[Static, Planned];
 /// Cases that have a motion.
 const MOVING: &[StudyMode] = &[Planned, Dynamic];
@@ -43,28 +43,28 @@ const fn group(title: &'static str, metrics: &'static [Metric]) -> Group {
 
 /// The metrics, group by group, in the order of reports.
 pub const GROUPS: &[Group] = &[
-    group("The posture", posture::POSTURE),
-    group("The needle, without engines", needle::PREDICTED),
-    group("The needle, simulated", needle::SIMULATED),
+    group("Posture", posture::POSTURE),
+    group("Needle, static equilibrium", needle::PREDICTED),
+    group("Needle, simulated", needle::SIMULATED),
     group("Motion and effort", effort::EFFORT),
-    group("Engines compared", effort::ENGINES_COMPARED),
-    group("The needle, over all arms and patients", needle::BUDGET),
+    group("Engine differences", effort::ENGINES_COMPARED),
+    group("Needle, arm and patient population", needle::BUDGET),
     group("People", people::PEOPLE),
+    group("Clearance from the surroundings", clearance::CLEARANCE),
     group(
-        "Clearance of arm and tool from their surroundings",
-        clearance::CLEARANCE,
+        "Minimum clearance of all bodies",
+        clearance::LEAST_CLEARANCE,
     ),
-    group("Least clearance of all", clearance::LEAST_CLEARANCE),
     group("Arm to skin", clearance::ARM_TO_SKIN),
-    group("To the table", clearance::TO_TABLE),
-    group("To the gantry", clearance::TO_GANTRY),
-    group("To the mount", clearance::TO_MOUNT),
-    group("To obstacles", clearance::TO_OBSTACLES),
-    group("To people", clearance::TO_PEOPLE),
-    group("The arm from itself", clearance::SELF_CLEARANCE),
+    group("Arm and tool to table", clearance::TO_TABLE),
+    group("Arm and tool to gantry", clearance::TO_GANTRY),
+    group("Arm and tool to mount", clearance::TO_MOUNT),
+    group("Arm and tool to obstacles", clearance::TO_OBSTACLES),
+    group("Arm and tool to people", clearance::TO_PEOPLE),
+    group("Self-clearance", clearance::SELF_CLEARANCE),
     group("Tool to skin", clearance::TOOL_TO_SKIN),
     group("Guide to skin", clearance::GUIDE_TO_SKIN),
-    group("Behind the guide", clearance::NEEDLE_CORRIDOR),
-    group("The needle's route", clearance::NEEDLE_ROUTE),
-    group("What a motion may keep", clearance::MARGIN),
+    group("Access zone behind the guide", clearance::NEEDLE_CORRIDOR),
+    group("Needle path", clearance::NEEDLE_ROUTE),
+    group("Motion margins", clearance::MARGIN),
 ];

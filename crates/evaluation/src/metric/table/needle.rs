@@ -1,7 +1,7 @@
-//! Where the needle is: predicted, simulated, and over all arms and patients.
+//! Where the needle is: predicted, simulated, and over the arm and patient population.
 
-use needlebench_cell::scenario::CriteriaSection;
-use needlebench_cell::study::StudyMode::Dynamic;
+use needlebench_scenario::scenario::CriteriaSection;
+use needlebench_scenario::study::StudyMode::Dynamic;
 
 use super::{ALL, MM, NEEDLE_RESOLUTION_M, UNSIMULATED};
 use crate::metric::entry::Better::Less;
@@ -39,13 +39,13 @@ fn guide_limit_m(criteria: &CriteriaSection) -> Option<f64> {
     criteria.max_guide_position_error_mm.map(|mm| mm * MM)
 }
 
-/// The needle where the balance of torques lets it come to rest, without any engine; without
+/// The needle in static equilibrium, without any engine; without
 /// imperfections where the arm is commanded to, which leaves the residual of the inverse kinematics.
 pub(super) const PREDICTED: &[Metric] = &[
     Metric::new(
         "tip_error_predicted",
         "predicted tip error",
-        "distance of the needle's tip from the target, by the balance of torques",
+        "distance of the needle tip from the target, in static equilibrium",
         Length,
         Configuration(|each| Some(each.predicted?.tip_position_error_m)),
     )
@@ -66,7 +66,7 @@ pub(super) const PREDICTED: &[Metric] = &[
     Metric::new(
         "needle_angle_error_predicted",
         "predicted needle angle error",
-        "angle between planned and actual needle, by the balance of torques",
+        "angle between planned and actual needle, in static equilibrium",
         Angle,
         Configuration(|each| Some(each.predicted?.needle_angle_error_rad)),
     )
@@ -79,7 +79,7 @@ pub(super) const PREDICTED: &[Metric] = &[
     Metric::new(
         "guide_position_error_predicted",
         "predicted guide position error",
-        "distance of the guide's exit from its planned place, by the balance of torques",
+        "distance of the guide exit from its planned position, in static equilibrium",
         Length,
         Configuration(|each| Some(each.predicted?.guide_position_error_m)),
     )
@@ -93,7 +93,7 @@ pub(super) const PREDICTED: &[Metric] = &[
     Metric::new(
         "lateral_error_predicted",
         "predicted lateral error",
-        "distance of the target from the needle's axis, by the balance of torques",
+        "distance of the target from the needle axis, in static equilibrium",
         Length,
         Configuration(|each| Some(each.predicted?.lateral_error_m)),
     )
@@ -106,8 +106,8 @@ pub(super) const PREDICTED: &[Metric] = &[
     Metric::new(
         "depth_error_predicted",
         "predicted depth error",
-        "distance of the needle's tip from the target along the needle, deeper is positive, by the balance \
-         of torques",
+        "distance of the needle tip from the target along the needle axis, positive when too deep, \
+         in static equilibrium",
         Length,
         Configuration(|each| Some(each.predicted?.depth_error_m)),
     )
@@ -118,8 +118,8 @@ pub(super) const PREDICTED: &[Metric] = &[
     Metric::new(
         "entry_error_predicted",
         "predicted entry error",
-        "distance of where the needle's axis meets the skin from the planned entry point, by the balance of \
-         torques",
+        "distance of the needle axis's intersection with the skin from the planned entry point, in \
+         static equilibrium",
         Length,
         Configuration(|each| each.predicted?.entry_point_error_m),
     )
@@ -131,7 +131,7 @@ pub(super) const PREDICTED: &[Metric] = &[
     Metric::new(
         "entry_lateral_error_predicted",
         "predicted lateral error at the entry",
-        "distance of the planned entry point from the needle's axis, by the balance of torques",
+        "distance of the planned entry point from the needle axis, in static equilibrium",
         Length,
         Configuration(|each| each.predicted?.entry_lateral_error_m),
     )
@@ -143,8 +143,8 @@ pub(super) const PREDICTED: &[Metric] = &[
     Metric::new(
         "needle_angle_axial_predicted",
         "predicted needle angle error, axial",
-        "angle between planned and actual needle as the patient's axial plane shows them, by the balance of \
-         torques; none where the needle stands more than 60 deg out of that plane",
+        "angle between planned and actual needle, projected onto the patient's axial plane, in \
+         static equilibrium; absent if the needle is more than 60 deg out of that plane",
         Angle,
         Configuration(|each| each.predicted?.axial_angle_error_rad),
     )
@@ -155,8 +155,8 @@ pub(super) const PREDICTED: &[Metric] = &[
     Metric::new(
         "needle_angle_sagittal_predicted",
         "predicted needle angle error, sagittal",
-        "angle between planned and actual needle as the patient's sagittal plane shows them, by the balance of \
-         torques; none where the needle stands more than 60 deg out of that plane",
+        "angle between planned and actual needle, projected onto the patient's sagittal plane, in \
+         static equilibrium; absent if the needle is more than 60 deg out of that plane",
         Angle,
         Configuration(|each| each.predicted?.sagittal_angle_error_rad),
     )
@@ -167,8 +167,8 @@ pub(super) const PREDICTED: &[Metric] = &[
     Metric::new(
         "true_target_error_predicted",
         "predicted distance from the true target",
-        "distance of the needle's tip from where the lesion really is (`true_target_mm`), by the balance of \
-         torques; none where that is not known",
+        "distance of the needle tip from the true lesion position (`true_target_mm`), in static \
+         equilibrium; absent if that position is unknown",
         Length,
         Configuration(|each| each.predicted?.true_target_error_m),
     )
@@ -183,9 +183,9 @@ pub(super) const PREDICTED: &[Metric] = &[
     .statistics(Statistics::BY_CASE),
     Metric::new(
         "true_target_lateral_predicted",
-        "predicted distance of the true target across the needle",
-        "distance of where the lesion really is (`true_target_mm`) from the needle's axis, by the balance of \
-         torques; none where that is not known",
+        "predicted lateral distance from the true target",
+        "distance of the true lesion position (`true_target_mm`) from the needle axis, in static \
+         equilibrium; absent if that position is unknown",
         Length,
         Configuration(|each| each.predicted?.true_target_lateral_m),
     )
@@ -217,7 +217,7 @@ pub(super) const SIMULATED: &[Metric] = &[
     Metric::new(
         "tip_error",
         "tip error",
-        "distance of the settled needle's tip from the target",
+        "distance of the settled needle tip from the target",
         Length,
         Engines(|each| Some(each.needle.tip_position_error_m)),
     )
@@ -252,7 +252,7 @@ pub(super) const SIMULATED: &[Metric] = &[
     Metric::new(
         "guide_position_error",
         "guide position error",
-        "settled distance of the guide's exit from its planned place",
+        "settled distance of the guide exit from its planned position",
         Length,
         Engines(|each| Some(each.needle.guide_position_error_m)),
     )
@@ -263,7 +263,7 @@ pub(super) const SIMULATED: &[Metric] = &[
     Metric::new(
         "lateral_error",
         "lateral error",
-        "settled distance of the target from the needle's axis",
+        "settled distance of the target from the needle axis",
         Length,
         Engines(|each| Some(each.needle.lateral_error_m)),
     )
@@ -274,7 +274,8 @@ pub(super) const SIMULATED: &[Metric] = &[
     Metric::new(
         "depth_error",
         "depth error",
-        "settled distance of the needle's tip from the target along the needle, deeper is positive",
+        "settled distance of the needle tip from the target along the needle axis, positive when \
+         too deep",
         Length,
         Engines(|each| Some(each.needle.depth_error_m)),
     )
@@ -283,8 +284,8 @@ pub(super) const SIMULATED: &[Metric] = &[
     Metric::new(
         "true_target_error",
         "distance from the true target",
-        "distance of the settled needle's tip from where the lesion really is (`true_target_mm`); none where \
-         that is not known",
+        "distance of the settled needle tip from the true lesion position (`true_target_mm`); \
+         absent if that position is unknown",
         Length,
         Engines(|each| each.needle.true_target_error_m),
     )
@@ -294,17 +295,17 @@ pub(super) const SIMULATED: &[Metric] = &[
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
     .engines(5, "true lesion\n{engine}")
-    .summary(8, "From the true lesion, {engine}")
-    .page(22, "From the true lesion, {engine}")
-    .page_side(5, "From the true lesion")
+    .summary(8, "Distance to true lesion, {engine}")
+    .page(22, "Distance to true lesion, {engine}")
+    .page_side(5, "Distance to true lesion")
     .criterion("max_true_target_error_mm", &[Dynamic], true_target_limit_m)
     .missing(Missing::Skips)
     .statistics(Statistics::BY_CASE.page(Fine)),
     Metric::new(
         "true_target_lateral",
-        "distance of the true target across the needle",
-        "settled distance of where the lesion really is (`true_target_mm`) from the needle's axis; none where \
-         that is not known",
+        "lateral distance from the true target",
+        "settled distance of the true lesion position (`true_target_mm`) from the needle axis; \
+         absent if that position is unknown",
         Length,
         Engines(|each| each.needle.true_target_lateral_m),
     )
@@ -312,9 +313,9 @@ pub(super) const SIMULATED: &[Metric] = &[
     .known(Value, ThisDraw, Simulated)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .engines(6, "across\nthe needle")
-    .summary(9, "Across the needle")
-    .page(23, "Across the needle")
+    .engines(6, "true lesion\nlateral")
+    .summary(9, "Lateral distance to true lesion")
+    .page(23, "Lateral distance to true lesion")
     .criterion(
         "max_true_target_lateral_mm",
         &[Dynamic],
@@ -325,7 +326,8 @@ pub(super) const SIMULATED: &[Metric] = &[
     Metric::new(
         "entry_error",
         "entry error",
-        "settled distance of where the needle's axis meets the skin from the planned entry point",
+        "settled distance of the needle axis's intersection with the skin from the planned entry \
+         point",
         Length,
         Engines(|each| each.needle.entry_point_error_m),
     )
@@ -335,7 +337,7 @@ pub(super) const SIMULATED: &[Metric] = &[
     Metric::new(
         "entry_lateral_error",
         "lateral error at the entry",
-        "settled distance of the planned entry point from the needle's axis",
+        "settled distance of the planned entry point from the needle axis",
         Length,
         Engines(|each| each.needle.entry_lateral_error_m),
     )
@@ -345,8 +347,8 @@ pub(super) const SIMULATED: &[Metric] = &[
     Metric::new(
         "needle_angle_axial",
         "needle angle error, axial",
-        "settled angle between planned and actual needle as the patient's axial plane shows them; none where \
-         the needle stands more than 60 deg out of that plane",
+        "settled angle between planned and actual needle, projected onto the patient's axial \
+         plane; absent if the needle is more than 60 deg out of that plane",
         Angle,
         Engines(|each| each.needle.axial_angle_error_rad),
     )
@@ -355,8 +357,8 @@ pub(super) const SIMULATED: &[Metric] = &[
     Metric::new(
         "needle_angle_sagittal",
         "needle angle error, sagittal",
-        "settled angle between planned and actual needle as the patient's sagittal plane shows them; none \
-         where the needle stands more than 60 deg out of that plane",
+        "settled angle between planned and actual needle, projected onto the patient's sagittal \
+         plane; absent if the needle is more than 60 deg out of that plane",
         Angle,
         Engines(|each| each.needle.sagittal_angle_error_rad),
     )
@@ -364,12 +366,12 @@ pub(super) const SIMULATED: &[Metric] = &[
     .better(Less, NEEDLE_RESOLUTION_RAD),
 ];
 
-/// The needle over all arms and patients.
+/// The needle over the arm and patient population.
 pub(super) const BUDGET: &[Metric] = &[
     Metric::new(
         "tip_rms",
-        "rms tip error",
-        "root mean square distance of the needle's tip from the target, analytic",
+        "RMS tip error",
+        "root-mean-square distance of the needle tip from the target, analytic",
         Length,
         Configuration(|each| Some(budget(each)?.rms_m)),
     )
@@ -379,10 +381,10 @@ pub(super) const BUDGET: &[Metric] = &[
     .ranked("tip_error_mm")
     .pareto()
     .show(Show::SmallLength)
-    .table(0, "tip error\nrms")
-    .summary(0, "Expected tip error, rms")
-    .page(0, "Expected rms")
-    .page_side(0, "Expected rms")
+    .table(0, "RMS tip\nerror")
+    .summary(0, "RMS tip error")
+    .page(0, "RMS tip error")
+    .page_side(0, "RMS tip error")
     .criterion("max_tip_rms_mm", ALL, |criteria| {
         criteria.max_tip_rms_mm.map(|mm| mm * MM)
     })
@@ -390,8 +392,9 @@ pub(super) const BUDGET: &[Metric] = &[
     .statistics(Statistics::BY_CASE.criterion("max_tip_rms_mm")),
     Metric::new(
         "tip_within_95",
-        "95 % of tip errors",
-        "distance of the needle's tip from the target that 95 % of all arms and patients stay within",
+        "P95 tip error",
+        "95th percentile of the distance of the needle tip from the target, over the arm and \
+         patient population",
         Length,
         Configuration(|each| each.budget.as_ref()?.total.at_target.radius_95_m),
     )
@@ -399,38 +402,38 @@ pub(super) const BUDGET: &[Metric] = &[
     .known(Value, OverBudget, FinalPosture)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .table(1, "tip error\nin 95 %")
-    .summary(1, "95 % within")
-    .page(1, "95 % within")
-    .page_side(1, "95 % within"),
+    .table(1, "P95 tip\nerror")
+    .summary(1, "P95 tip error")
+    .page(1, "P95 tip error")
+    .page_side(1, "P95 tip error"),
     Metric::new(
         "tip_bias",
-        "mean tip error",
-        "length of the mean error vector of the needle's tip, analytic",
+        "tip bias",
+        "length of the mean error vector of the needle tip, analytic",
         Length,
         Configuration(|each| Some(budget(each)?.bias().norm())),
     )
     .known(Value, OverBudget, FinalPosture)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .table(2, "tip error\nbias")
-    .page(2, "Bias"),
+    .table(2, "tip\nbias")
+    .page(2, "Tip bias"),
     Metric::new(
         "tip_rms_breathing_freely",
-        "rms tip error of a patient who breathes freely",
-        "as `tip_rms` where the breath is not held, analytic",
+        "RMS tip error, free breathing",
+        "as `tip_rms`, for a freely breathing patient, analytic",
         Length,
         Configuration(|each| Some(each.budget.as_ref()?.breathing_freely?.rms_m)),
     )
     .known(Value, OverBudget, FinalPosture)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .table(3, "tip error\nbreathing"),
+    .table(3, "free-breathing\nRMS tip error"),
     Metric::new(
         "tip_lateral_rms_before_insertion",
-        "rms lateral tip error before the insertion",
-        "root mean square distance of the target from the needle's line before the needle goes in, in a \
-         phantom that lies still, analytic: what robots are measured by without deploying the needle",
+        "RMS lateral error before insertion",
+        "root-mean-square distance of the target from the needle axis before insertion, in a \
+         motionless phantom, analytic: the accuracy that robots report without needle deployment",
         Length,
         Configuration(|each| Some(each.budget.as_ref()?.before_insertion?.lateral_rms_m)),
     )
@@ -438,8 +441,8 @@ pub(super) const BUDGET: &[Metric] = &[
     .better(Less, NEEDLE_RESOLUTION_M),
     Metric::new(
         "tip_lateral_rms",
-        "rms lateral tip error",
-        "root mean square distance of the needle's tip from the target across the needle, analytic",
+        "RMS lateral tip error",
+        "root-mean-square lateral distance of the needle tip from the target, analytic",
         Length,
         Configuration(|each| Some(budget(each)?.lateral_rms_m)),
     )

@@ -1,4 +1,4 @@
-//! What is left to the people around it.
+//! Free space and lines of sight of the people around the arm.
 
 use super::{MOVING, SHARE_RESOLUTION};
 use crate::metric::entry::Better::More;
@@ -12,7 +12,7 @@ pub(super) const PEOPLE: &[Metric] = &[
     Metric::new(
         "free_fraction",
         "free space",
-        "share of the half ball about the entry point that is free of arm and tool",
+        "fraction of the hemisphere about the entry point that is free of arm and tool",
         Ratio,
         Configuration(|each| room(each, |room| room.free_fraction)),
     )
@@ -27,7 +27,8 @@ pub(super) const PEOPLE: &[Metric] = &[
     Metric::new(
         "sight_fraction",
         "line of sight",
-        "share of people's lines of sight to entry point and needle that arm and tool leave, of those that are free without them",
+        "fraction of people's lines of sight to entry point and needle that arm and tool do not \
+         block, of those that are free without them",
         Ratio,
         Configuration(|each| room(each, |room| room.sight_fraction)),
     )
@@ -35,14 +36,14 @@ pub(super) const PEOPLE: &[Metric] = &[
     .ranked("sight_fraction")
     .pareto()
     .show(Show::Percent)
-    .summary(6, "Sight")
+    .summary(6, "Line of sight")
     .criterion("min_sight_fraction", MOVING, |criteria| {
         criteria.min_sight_fraction
     }),
     Metric::new(
         "hand_cone",
-        "cone for the hand",
-        "half-angle of the largest free cone behind the guide, a proven lower bound",
+        "hand cone",
+        "half-angle of the largest free cone behind the guide, a certified lower bound",
         Angle,
         Configuration(|each| room(each, |room| room.hand_cone_half_angle_rad)),
     )
@@ -59,12 +60,14 @@ pub(super) const PEOPLE: &[Metric] = &[
             .room
             .as_ref()
             .and_then(|room| room.hand_cone_blocker.as_ref());
-        blocker.map_or(String::new(), |blocker| format!("blocked by {}", part_in_words(blocker)))
+        blocker.map_or(String::new(), |blocker| {
+            format!("blocked by {}", part_in_words(blocker))
+        })
     }),
     Metric::new(
         "preference",
-        "doctor's preferences",
-        "how well the doctor's stated preferences are met, 0 to 1",
+        "physician's preferences",
+        "degree to which the physician's stated preferences are met, 0 to 1",
         Ratio,
         Configuration(preference),
     )

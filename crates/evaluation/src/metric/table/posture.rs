@@ -68,7 +68,7 @@ pub(super) const POSTURE: &[Metric] = &[
     .in_static_cases("q6_static"),
     Metric::new(
         "joint_margin",
-        "margin to joint limits",
+        "joint-limit margin",
         "1 in the middle of every joint's range, 0 at a limit",
         Ratio,
         Configuration(|each| Some(each.margins?.joint_limit)),
@@ -98,8 +98,8 @@ pub(super) const POSTURE: &[Metric] = &[
     .better(More, SHARE_RESOLUTION),
     Metric::new(
         "singularity_margin",
-        "margin to singularities",
-        "less of |sin q5| and |sin q3|; 0 is singular",
+        "singularity margin",
+        "smaller of |sin q5| and |sin q3|; 0 is singular",
         Ratio,
         Configuration(singularity),
     )
@@ -129,8 +129,8 @@ pub(super) const POSTURE: &[Metric] = &[
     .better(More, 1e-4),
     Metric::new(
         "tip_sensitivity",
-        "sensitivity of the tip",
-        "root of the sum of the squared speeds of the needle's tip under each joint alone",
+        "tip sensitivity",
+        "Frobenius norm of the tip position Jacobian",
         LengthPerAngle,
         Configuration(|each| each.tip_sensitivity_m_per_rad),
     )
@@ -142,14 +142,14 @@ pub(super) const POSTURE: &[Metric] = &[
     .statistics(Statistics::SPREAD),
     Metric::new(
         "surplus",
-        "distance from breaking a rule",
-        "distance of the posture from breaking a rule of the plan, negative where it breaks one; sines and \
-         radians count 100 mm",
+        "constraint margin",
+        "distance of the posture from violating a planning rule, negative if it violates one; \
+         sines and radians count as 100 mm each",
         Length,
         Configuration(|each| each.surplus_m),
     )
     .in_static_cases("surplus_static")
-    .case(6, "surplus\nmm")
+    .case(6, "margin\nmm")
     .better(More, CLEARANCE_RESOLUTION_M)
     .statistics(Statistics::SPREAD.page(Coarse)),
 ];
