@@ -7,11 +7,11 @@ use needlebench_kinematics::NotUrGeometry;
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum ExportError {
     /// The engine has no model of the cell.
-    #[error("the cell cannot be made in the engine: {0}")]
+    #[error("the cell cannot be built in the engine: {0}")]
     Engine(#[from] EngineError),
-    /// Nobody says how often the arm's controller takes set-points.
+    /// The set-point period of the arm's controller is unknown.
     #[error(
-        "the data of the arm {arm} do not say how often its controller takes set-points: `period_ms` under \
+        "the data of the arm {arm} lack the set-point period of its controller: `period_ms` under \
          [control] of its arm.toml"
     )]
     NoPeriod {
@@ -28,7 +28,7 @@ pub enum ExportError {
         goal: String,
         /// Label of the configuration.
         configuration: &'static str,
-        /// Rules that it breaks, in words.
+        /// Rules that it violates, in words.
         reason: String,
     },
     /// The arm has no closed form, so goals have no postures.

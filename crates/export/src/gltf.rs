@@ -1,17 +1,18 @@
 //! The cell as a picture in space: binary glTF 2.0.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 use nalgebra::{Translation3, UnitQuaternion};
 use needlebench_bench::provenance::PROGRAM_VERSION;
-use needlebench_cell::{ResolvedScenario, reason_in_words};
+use needlebench_cell::reason_in_words;
 use needlebench_clearance::ClearanceModel;
 use needlebench_geometry::{Shape, TriangleMesh};
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{JOINT_COUNT, JOINT_NAMES, Joints, LINK_NAMES, Pose};
 use needlebench_planning::Planner;
+use needlebench_scenario::ResolvedScenario;
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Value, json};
 
 use crate::marks::{marks, people};
@@ -40,7 +41,7 @@ pub enum Shown {
     Start,
     /// Joint positions, rad.
     Joints(Joints),
-    /// Where a configuration serves a goal, with the planned motion there as an animation.
+    /// A feasible configuration of a goal, with its planned motion as an animation.
     Goal {
         /// Index of the goal.
         goal: usize,
@@ -48,6 +49,13 @@ pub enum Shown {
         configuration: Configuration,
     },
 }
+
+/// What a relative URI has no letters for (RFC 3986): all but its unreserved ones.
+const RESERVED: &AsciiSet = &NON_ALPHANUMERIC
+    .remove(b'-')
+    .remove(b'.')
+    .remove(b'_')
+    .remove(b'~');
 
 /// How a scene is packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,7 +87,7 @@ pub fn gltf(
         "scenario": resolved.scenario.name,
         "scenario_sha256": resolved.source.sha256,
         "program": format!("needlebench {PROGRAM_VERSION}"),
-        "arm": resolved.cell.robot.arm_name(),
+        "arm": resolved.robot_description.arm_name.clone(),
         "tool": resolved.cell.tool.name,
         "joint_names": JOINT_NAMES,
         "joint_positions_rad": <[f64; JOINT_COUNT]>::from(posed.joints),
@@ -111,7 +119,7 @@ struct Posed {
     /// Goal of whose people are shown, if it is known.
     goal: Option<usize>,
     motion: Option<JointTrajectory>,
-    /// Rules that the configuration breaks, in words.
+    /// Rules that the configuration violates, in words.
     broken_rules: Vec<String>,
 }
 
@@ -464,7 +472,7 @@ impl Scene {
         let mut scene = self.described(extras);
         let numbers = format!("{stem}.bin");
         // A path of another file in JSON is a URI.
-        scene["buffers"][0]["uri"] = json!(as_uri(&numbers));
+        scene["buffers"][0]["uri"] = json!(utf8_percent_encode(&numbers, RESERVED).to_string());
         vec![
             ExportedFile::text(format!("{stem}.gltf"), scene.to_string()),
             ExportedFile {
@@ -516,19 +524,6 @@ impl Scene {
         }
         file
     }
-}
-
-/// A file's name as a relative URI (RFC 3986): all but unreserved characters by their bytes.
-fn as_uri(name: &str) -> String {
-    let mut uri = String::new();
-    for byte in name.bytes() {
-        if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
-            uri.push(char::from(byte));
-        } else {
-            let _ = write!(uri, "%{byte:02X}");
-        }
-    }
-    uri
 }
 
 /// Numbers of the format.

@@ -1,28 +1,21 @@
 //! What every export says of itself.
 
 use needlebench_bench::provenance::PROGRAM_VERSION;
-use needlebench_cell::ResolvedScenario;
+use needlebench_scenario::ResolvedScenario;
 
 /// Lines for the head of a file: which scenario, from which bytes, by which program, in which units,
 /// and what was assumed. No time and no path of this machine: the same scenario gives the same lines.
 pub(crate) fn head(resolved: &ResolvedScenario, what: &str) -> Vec<String> {
-    let robot = &resolved.cell.robot;
+    let robot = &resolved.robot_description;
     let mut lines = vec![
         format!("{what}, of the scenario {}", resolved.scenario.name),
         format!("scenario file: sha256 {}", resolved.source.sha256),
         format!("made by needlebench {PROGRAM_VERSION}"),
-        format!(
-            "arm: {}, tool: {}",
-            robot.arm_name(),
-            resolved.cell.tool.name
-        ),
-        "units: m, kg, s, rad, N m; z is up; the world is that of the scenario".to_owned(),
+        format!("arm: {}, tool: {}", robot.arm_name, resolved.cell.tool.name),
+        "units: m, kg, s, rad, N m; z up; world frame of the scenario".to_owned(),
     ];
     if resolved.imperfections.is_some() {
-        lines.push(
-            "The cell is the nominal one: the imperfections that the scenario draws are not in it"
-                .to_owned(),
-        );
+        lines.push("nominal cell, without the imperfections sampled in the scenario".to_owned());
     }
     lines.extend(robot.notes.iter().map(|note| format!("note: {note}")));
     let own = resolved.notes.iter();

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use needlebench_cell::ResolvedScenario;
-use needlebench_cell::people::Person;
 use needlebench_kinematics::Pose;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::people::Person;
 
 use crate::MovesWith;
 

@@ -88,13 +88,13 @@ fn metadata(motion: &Motion<'_>) -> BTreeMap<String, String> {
         .collect();
     all.insert(
         "truth".to_owned(),
-        "simulated: no real robot moved".to_owned(),
+        "simulated, not recorded on a real robot".to_owned(),
     );
     let rules = motion.rejections.first().map_or_else(
-        || "all kept".to_owned(),
+        || "all satisfied".to_owned(),
         |first| {
             let rule = rule_in_words(first.rule.name());
-            format!("does not work: {rule}: {}", first.detail)
+            format!("infeasible: {rule}: {}", first.detail)
         },
     );
     all.insert("planning_rules".to_owned(), rules);

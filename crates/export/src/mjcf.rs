@@ -1,9 +1,10 @@
 //! The cell as a model of MuJoCo.
 
-use needlebench_cell::{Frame, ResolvedScenario};
+use needlebench_cell::Frame;
 use needlebench_engine::ArmSpec;
 use needlebench_engine::mujoco::{Keyframe, MarkedPlace, StandaloneModel, standalone_model};
 use needlebench_kinematics::JOINT_COUNT;
+use needlebench_scenario::ResolvedScenario;
 
 use crate::head::{head, xml_comment};
 use crate::marks::marks;
@@ -33,21 +34,24 @@ pub fn mjcf(resolved: &ResolvedScenario, stem: &str) -> Result<Vec<ExportedFile>
         keyframes: keyframes.collect(),
         sites: sites(resolved),
     };
-    let arm = ArmSpec::new(cell, &resolved.scenario.engines);
+    let settings = resolved.scenario.engines.settings();
+    let arm = ArmSpec::new(cell, &settings);
     let model = standalone_model(&arm, &standalone)?;
     Ok(vec![ExportedFile::text(format!("{stem}.xml"), model)])
 }
 
 /// What the model is, for who opens it.
 const REMARKS: [&str; 6] = [
-    "Collision geometry is what clearances and engines have: primitives and convex pieces. Only pairs that needlebench \
-     measures can touch; what a body may not touch is in contype and conaffinity.",
-    "Motors are ideal torques at the joints, limited to the arm's; ctrl of a keyframe holds the arm against gravity there. \
-     There is no servo, no friction and no backlash.",
-    "Joint limits are stops of the model; a real arm stops before by itself. The engine of needlebench has no stops.",
-    "Contacts are as stiff as the time step allows; a longer step needs a softer solref.",
-    "Keyframes of goals are the postures that a plan tries first; whether a motion leads there is said by a run.",
-    "The needle's corridor is a geom that touches nothing. Inner organs are left out.",
+    "Collision geometry is that of clearances and engines: primitives and convex pieces. Only \
+     pairs that needlebench measures can collide, as set by contype and conaffinity.",
+    "Motors are ideal joint torques within the arm's limits; ctrl of a keyframe compensates \
+     gravity there. No servo, no friction, no backlash.",
+    "Joint limits are hard stops of the model; a real arm stops before them. The engine of \
+     needlebench has no stops.",
+    "Contacts are as stiff as the time step allows; a longer step requires a softer solref.",
+    "Keyframes of goals are the postures that a plan tries first; a run determines whether a \
+     motion to them is feasible.",
+    "The access zone (needle_corridor) is a geom without collisions. Inner organs are omitted.",
 ];
 
 /// Marked places, in the frames of the model's bodies.

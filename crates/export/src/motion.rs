@@ -1,16 +1,16 @@
 //! A motion that is exported, and what every export says of it.
 
-use needlebench_bench::EngineRun;
 use needlebench_bench::motion::WorkingMotion;
 use needlebench_bench::provenance::PROGRAM_VERSION;
-use needlebench_bench::{RealArm, ScenarioRun};
-use needlebench_cell::{ClearanceClass, Goal, ResolvedScenario, pair_in_words};
+use needlebench_bench::{EngineRun, RealArm, ScenarioRun};
+use needlebench_cell::{ClearanceClass, pair_in_words};
 use needlebench_clearance::MotionCertificate;
 use needlebench_evaluation::report::Status;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
 use needlebench_planning::Rejection;
+use needlebench_scenario::{Goal, ResolvedScenario};
 
 /// A planned motion and, where an engine carried it out, its recording.
 #[derive(Debug, Clone, Copy)]
@@ -25,9 +25,9 @@ pub struct Motion<'a> {
     pub trajectory: &'a JointTrajectory,
     /// What the run says of it.
     pub status: Status,
-    /// Rules that it breaks, the first failing one first: what runs simulate of configurations that do not work.
+    /// Rules that it violates, the first failing one first: what runs simulate of configurations that do not work.
     pub rejections: &'a [Rejection],
-    /// What is proven of its clearances; none where nothing is.
+    /// Its certified clearances; none where there are none.
     pub certificate: Option<&'a MotionCertificate>,
     /// As an engine recorded it.
     pub recorded: &'a EngineRun,
@@ -36,7 +36,7 @@ pub struct Motion<'a> {
 }
 
 impl<'a> Motion<'a> {
-    /// Of a motion that works.
+    /// Of a feasible motion.
     pub fn of(working: &'a WorkingMotion) -> Self {
         Self {
             resolved: working.scenario(),
@@ -74,13 +74,13 @@ impl<'a> Motion<'a> {
 
     /// What it is and where it comes from, by name.
     pub(crate) fn origin(&self) -> Vec<(&'static str, String)> {
-        let robot = &self.resolved.cell.robot;
+        let robot = &self.resolved.robot_description;
         vec![
             ("program", format!("needlebench {PROGRAM_VERSION}")),
             ("scenario", self.resolved.scenario.name.clone()),
             ("scenario_sha256", self.resolved.source.sha256.clone()),
             ("seed", self.resolved.scenario.seed.to_string()),
-            ("arm", robot.arm_name()),
+            ("arm", robot.arm_name.clone()),
             ("robot_sha256", robot.source.sha256.clone()),
             ("tool", self.resolved.cell.tool.name.clone()),
             ("goal", self.goal.name.clone()),
@@ -93,8 +93,8 @@ impl<'a> Motion<'a> {
         ]
     }
 
-    /// Proven lower bounds of the planned motion's clearances by class, m, with the pair that comes nearest; classes that
-    /// the cell has no part for, and those of the needle, are absent. None where nothing is proven.
+    /// Proven lower bounds of the planned motion's clearances by class, m, with the pair that comes nearest; classes
+    /// that the cell has no part for, and those of the needle, are absent. None where nothing is certified.
     pub(crate) fn proven_m(&self) -> Option<Vec<Proven>> {
         let certificate = self.certificate?;
         let classes = ClearanceClass::ALL.into_iter();
@@ -115,10 +115,10 @@ impl<'a> Motion<'a> {
     /// The same as a line of words for each class, less what an export strays from the planned path.
     pub(crate) fn proven_in_words(&self, stray_m: f64) -> Vec<String> {
         let Some(proven) = self.proven_m() else {
-            return vec!["not certified: nothing is proven of its clearances".to_owned()];
+            return vec!["not certified: no certified clearances".to_owned()];
         };
         if proven.is_empty() {
-            return vec!["nothing that it could come near to".to_owned()];
+            return vec!["no pairs".to_owned()];
         }
         let line = |each: &Proven| {
             // Down, so that what is said is proven.
@@ -164,7 +164,7 @@ impl<'a> Motion<'a> {
     }
 }
 
-/// A proven clearance.
+/// A certified clearance.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Proven {
     pub class: ClearanceClass,

@@ -1,10 +1,10 @@
 //! Postures with names: where the arm starts, and where it ends.
 
-use needlebench_cell::ResolvedScenario;
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::{Joints, NotUrGeometry};
 use needlebench_planning::Planner;
+use needlebench_scenario::ResolvedScenario;
 
 /// A posture with a name of letters, digits and `_ - . /`.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,7 +15,7 @@ pub(crate) struct NamedPosture {
     pub joints: Joints,
 }
 
-/// The start posture, and for each goal the final posture of each configuration that breaks no rule: the one that a
+/// The start posture, and for each goal the final posture of each configuration that violates no rule: the one that a
 /// plan tries first, without a look at motions.
 pub(crate) fn named_postures(
     resolved: &ResolvedScenario,

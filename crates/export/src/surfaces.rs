@@ -1,12 +1,13 @@
 //! What a cell looks like: surfaces by what they move with, for pages and for other tools.
 
 use nalgebra::Point3;
-use needlebench_cell::fixtures::{Fixture, FixtureKind};
-use needlebench_cell::phantom::{PhantomPart, Tissue};
-use needlebench_cell::scenario::AttachedTo;
-use needlebench_cell::{BodyKind, Frame, PlacedPhantom, ResolvedScenario, Robot, Tool};
+use needlebench_cell::{BodyKind, Frame, Robot, Tool};
 use needlebench_geometry::{Shape, Solid, TriangleMesh, Visual};
 use needlebench_kinematics::Pose;
+use needlebench_phantom::{PhantomPart, Tissue};
+use needlebench_scenario::fixtures::{Fixture, FixtureKind};
+use needlebench_scenario::scenario::AttachedTo;
+use needlebench_scenario::{PlacedPhantom, ResolvedScenario};
 
 /// Fineness of curved surfaces, m.
 const CHORD_ERROR_M: f64 = 1e-3;
@@ -14,7 +15,7 @@ const CHORD_ERROR_M: f64 = 1e-3;
 const COLLISION_CHORD_ERROR_M: f64 = 2e-3;
 /// Colour of collision shapes.
 const COLLISION: [f32; 4] = [0.80, 0.47, 0.65, 0.5];
-/// Colour of the needle corridor.
+/// Colour of the access zone.
 const CORRIDOR: [f32; 4] = [0.34, 0.71, 0.91, 0.35];
 /// Colour of tools without surfaces for pictures.
 const TOOL: [f32; 4] = [0.35, 0.37, 0.40, 1.0];
@@ -189,7 +190,7 @@ impl Surfaces {
 }
 
 /// All of a cell: arm, tool, what stands around, the patient; and besides, as groups of their own, the
-/// needle's corridor and the collision shapes of arm and tool.
+/// access zone and the collision shapes of arm and tool.
 pub fn surfaces_of_cell(resolved: &ResolvedScenario) -> Surfaces {
     let cell = &resolved.cell;
     let robot = &cell.robot;

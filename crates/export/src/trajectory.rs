@@ -43,7 +43,7 @@ pub enum TrajectoryNotation {
 
 /// What every trajectory says first.
 pub(crate) const NEVER_RUN: &str =
-    "made from a simulation; never run on a robot, and said to be safe for none";
+    "generated from a simulation, never run on a robot; not claimed to be safe on any robot";
 
 /// The planned motion as a joint trajectory in a file of this name.
 pub fn trajectory(motion: &Motion<'_>, notation: TrajectoryNotation, name: &str) -> ExportedFile {
@@ -215,22 +215,22 @@ impl Interpolation {
     fn in_words(&self) -> [String; 3] {
         let [quintics, cubics] = [("quintics", self.quintic), ("cubics", self.cubic)].map(|(what, off)| {
             format!(
-                "joined by {what}: joints within {:.1e} rad of the planned motion, arm and tool within {:.1e} m, \
-                 measured at {} places between each two points",
+                "interpolated by {what}: joints within {:.1e} rad of the planned motion, arm and \
+                 tool within {:.1e} m, measured at {} positions between consecutive points",
                 off.joint_rad,
                 off.arm_m,
                 PLACES - 1
             )
         });
         let accelerations = format!(
-            "joined by quintics: accelerations within {:.1e} rad/s^2 of the planned ones",
+            "interpolated by quintics: accelerations within {:.1e} rad/s^2 of the planned ones",
             self.acceleration
         );
         [quintics, cubics, accelerations]
     }
 }
 
-/// What it is, where it comes from, what it presumes and what is proven.
+/// What it is, where it comes from, what it presumes and what is certified.
 fn head(motion: &Motion<'_>, off: &Interpolation) -> Vec<String> {
     let (resolved, limits) = (motion.resolved, &motion.resolved.motion);
     let tool = &resolved.cell.tool;
@@ -253,8 +253,7 @@ fn head(motion: &Motion<'_>, off: &Interpolation) -> Vec<String> {
         )
     };
     let mut lines = vec![
-        "Planned motion of a needle guide to where the needle goes in, at rest at both ends."
-            .to_owned(),
+        "Planned motion of a needle guide to the insertion pose, at rest at both ends.".to_owned(),
         format!("NEVER RUN ON A ROBOT: {NEVER_RUN}."),
     ];
     let origin = motion.origin().into_iter();
@@ -265,7 +264,7 @@ fn head(motion: &Motion<'_>, off: &Interpolation) -> Vec<String> {
         three(tool.body.com_m.into(), 1e3, 2)
     ));
     lines.push(format!(
-        "TCP (exit of the guide in the flange frame): {} mm, rotation vector {} rad",
+        "TCP (guide exit in the flange frame): {} mm, rotation vector {} rad",
         three(tcp.translation.vector.into(), 1e3, 3),
         three(rotation_vector(&tcp.rotation).into(), 1.0, 6)
     ));
@@ -283,12 +282,12 @@ fn head(motion: &Motion<'_>, off: &Interpolation) -> Vec<String> {
     }
     lines.extend(off.in_words());
     lines.push(
-        "proven least clearance of the nominal arm along the planned path, whatever the speed:"
+        "certified minimum clearance of the nominal arm along the planned path, at any speed:"
             .to_owned(),
     );
     let proven = motion.proven_in_words(off.quintic.arm_m);
     lines.extend(proven.into_iter().map(|line| format!("  {line}")));
-    lines.push("(less what joining by quintics may be off)".to_owned());
+    lines.push("(minus the deviation due to interpolation by quintics)".to_owned());
     lines
 }
 
@@ -342,7 +341,7 @@ fn in_json(motion: &Motion<'_>, points: &Points, off: &Interpolation) -> String 
             "com_in_flange_m": [tool.body.com_m.x, tool.body.com_m.y, tool.body.com_m.z],
         },
         "tcp": {
-            "what": "exit of the guide, z along the insertion",
+            "what": "guide exit, z along the insertion",
             "position_in_flange_m": numbers3(&tcp.translation.vector),
             "rotvec_in_flange_rad": numbers3(&rotation_vector(&tcp.rotation)),
         },

@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use nalgebra::{Rotation3, Vector3};
-use needlebench_cell::{
-    BodyKind, CollisionBody, Frame, LeftOut, PairRule, ResolvedScenario, pair_rule,
-};
+use needlebench_cell::{BodyKind, CollisionBody, Frame, LeftOut, PairRule, pair_rule};
 use needlebench_geometry::{Shape, Solid, TriangleMesh, Visual};
 use needlebench_kinematics::{Body, JOINT_COUNT, JOINT_NAMES, JointLimit, LINK_NAMES, Pose};
+use needlebench_scenario::ResolvedScenario;
 use quick_xml::escape::escape;
 
 use crate::head::{head, xml_comment};
@@ -20,15 +19,17 @@ use crate::{ExportError, ExportedFile, MovesWith};
 
 /// What the description is, for who opens it.
 const REMARKS: [&str; 6] = [
-    "Collision geometry is what clearances and engines have. A capsule is a cylinder and two spheres, which is the same set. \
-     Meshes are the surfaces themselves, with coordinates rounded to single precision (less than 6e-8 of their size).",
-    "Meshes of the package beside this file: package://STEM_meshes/... It is a ROS package for colcon; other tools take this \
-     file's folder as the folder of packages.",
-    "Rotor inertia, gravity, friction between bodies and accelerations have no place in a URDF and are left out. \
-     Limits of speed are the arm's, not those that the scenario's motions keep.",
-    "Inertias are those of the moving links and of the tool. What stands still has none.",
-    "needle_corridor is no body: it is the volume behind the guide that needle and hand need. A planner that checks it keeps \
-     it free, as needlebench does; take its link out for the bodies alone.",
+    "Collision geometry is that of clearances and engines. A capsule is written as a cylinder and \
+     two spheres, the same set. Meshes are the surfaces themselves, with coordinates rounded to \
+     single precision (less than 6e-8 of their size).",
+    "Meshes of the package beside this file: package://STEM_meshes/... It is a ROS package for \
+     colcon; other tools use this file's folder as the package folder.",
+    "Rotor inertia, gravity, friction between bodies and acceleration limits cannot be expressed \
+     in URDF and are omitted. Speed limits are those of the arm, not of the scenario's motions.",
+    "Inertias are those of the moving links and of the tool. Static bodies have none.",
+    "needle_corridor is not a body but the access zone behind the guide, which needle and hand \
+     require. A planner that checks it keeps it free, as needlebench does; remove its link for the \
+     bodies alone.",
     "Frames GOAL/target, GOAL/PERSON/eyes_1.75 and the like have no geometry.",
 ];
 
@@ -414,10 +415,11 @@ fn color(kind: BodyKind) -> [f32; 4] {
 /// Pairs of links that need no check, with the reason; the group of the arm; postures.
 fn srdf(resolved: &ResolvedScenario) -> Result<String, ExportError> {
     let cell = &resolved.cell;
-    let mut lines = head(resolved, "What may touch in the cell, and postures");
+    let mut lines = head(resolved, "Collision pairs of the cell, and postures");
     lines.push(
-        "Disabled pairs are those that needlebench does not measure: they share a joint (Adjacent), or never move against \
-         each other (Never). All others are measured, those included that prove never to touch: see needlebench pairs."
+        "Disabled pairs are those that needlebench does not measure: they share a joint (Adjacent) \
+         or never move relative to each other (Never). All others are measured, including those \
+         certified never to touch: see needlebench pairs."
             .to_owned(),
     );
     let mut text = format!(

@@ -12,7 +12,7 @@ const ROWS: usize = 500;
 /// How well an arm's nominal lengths explain the logged poses of the tool's point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ArmFit {
-    /// The maker's name.
+    /// The manufacturer's name.
     pub arm: &'static str,
     /// Root mean square distance of the logged points from those of the arm with the tool's point that
     /// fits best, m.

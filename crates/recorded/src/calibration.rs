@@ -35,8 +35,8 @@ const STEPS: usize = 8;
 /// Parts of a run, each predicted from the others.
 const PARTS: usize = 5;
 
-/// A calibration is kept if it predicts rows that it has not seen with no more than this share of the
-/// error of nominal lengths.
+/// A calibration is kept if its error on held-out rows is no more than this share of the error of nominal
+/// lengths.
 const WORTH: f64 = 0.5;
 
 /// A number is shown by the run if its standard deviation is below this share of the prior's.
@@ -98,17 +98,16 @@ pub struct CalibrationFit {
     pub rows: usize,
     /// Nominal lengths with the tool that fits best.
     pub nominal: PoseError,
-    /// What the calibration leaves of the rows that it was made from; says nothing of its worth.
+    /// Residual of the fit on its own rows; no measure of its accuracy.
     pub fitted: PoseError,
-    /// Nominal lengths and a tool from four fifths of the run, on the fifth that they have not seen; all
-    /// fifths in turn.
+    /// Nominal lengths with a tool fitted to four fifths of the run, on the held-out fifth; all fifths in turn.
     pub nominal_held_out: PoseError,
     /// The same of the calibration.
     pub held_out: PoseError,
     /// From the first half of the run on the second.
     pub second_half: PoseError,
-    /// Whether it predicts what it has not seen well enough to be used: no more than half of the error
-    /// of nominal lengths.
+    /// Whether it predicts held-out rows well enough to be used: with no more than half of the error of nominal
+    /// lengths.
     pub is_worth: bool,
 }
 

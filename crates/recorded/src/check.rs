@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 use needlebench_kinematics::trajectory::JointState;
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 
@@ -14,7 +14,7 @@ use crate::{EffortMeaning, Quantity, ReadOptions, RecordedRun};
 /// No joint of a UR arm but the last one of an e-Series turns farther than 363 degrees, rad.
 const FARTHEST_RAD: f64 = 7.0;
 
-/// Angles in degrees: nobody's wrist 3 has turned as far, rad.
+/// Larger angles are taken to be in degrees, rad.
 const FARTHEST_ENDLESS_RAD: f64 = 400.0;
 
 /// Rows farther apart are no recording of a motion, s: the clock has another unit.
@@ -51,9 +51,9 @@ pub(crate) fn checked(
     };
     if options.columns.is_some() && (options.time.is_some() || options.angle.is_some()) {
         return Err(vec![
-            Finding::new("the command line", "units are given twice")
+            Finding::new("the command line", "units are specified twice")
                 .key("--time-unit, --angle-unit")
-                .hint("with --columns the units are those of the table of columns"),
+                .hint("with --columns, the table of columns defines the units"),
         ]);
     }
     raw.sift();
@@ -64,11 +64,11 @@ pub(crate) fn checked(
         let mut findings = refuse(
             None,
             format!(
-                "{} of {} rows can be used, which is too few",
+                "too few usable rows: {} of {}",
                 usable.len(),
                 raw.rows_in_file
             ),
-            "a log has to hold a motion; what was left out and why is below",
+            "the log must contain a motion; rows left out are listed below",
         );
         findings.extend(
             raw.notes
@@ -117,7 +117,7 @@ pub(crate) fn checked(
                 refuse(
                     Some(line),
                     message,
-                    "the angles are in degrees: say so with --angle-unit deg",
+                    "if the angles are in degrees, give --angle-unit deg",
                 )
             })?;
         }
@@ -156,8 +156,7 @@ pub(crate) fn checked(
     notes.extend(signs);
     if target.is_none() {
         notes.push(
-            "the log has no target_q: an arm can be calibrated from it, but there is nothing to \
-             replay"
+            "the log has no target_q: it can be used for calibration, but there is nothing to replay"
                 .to_owned(),
         );
     }
@@ -209,7 +208,7 @@ fn clock(
         return Err((
             None,
             format!(
-                "the clock stands still between {standing} of {} rows: it has too few digits",
+                "the clock does not advance between {standing} of {} rows: too few digits",
                 time_s.len()
             ),
             "record it with more digits, or give --rate HZ if rows are evenly spaced",
@@ -220,7 +219,7 @@ fn clock(
         .collect();
     if standing > 0 {
         notes.push(format!(
-            "{standing} rows with the time of the row before left out"
+            "{standing} rows left out: same time as the row before"
         ));
     }
     steps.retain(|step| *step > 0.0);
@@ -240,15 +239,15 @@ fn clock(
     if median_s > SLOWEST_S && options.time.is_none() && options.columns.is_none() {
         return Err((
             None,
-            format!("from row to row it is {median_s} s, if the clock is in seconds"),
-            "is it in milliseconds? say so with --time-unit ms (or us, ns; s if it is true)",
+            format!("the row interval is {median_s} s if the clock is in seconds"),
+            "if it is in milliseconds, give --time-unit ms (or us, ns; s if seconds are right)",
         ));
     }
     let times = keep.iter().map(|row| time_s[*row]).collect();
     Ok((keep, times))
 }
 
-/// Refuses angles that no arm has.
+/// Rejects angles that no arm has.
 fn angles(
     name: &str,
     values: &[Joints],
@@ -265,7 +264,7 @@ fn angles(
             };
             if value.abs() > farthest {
                 let message = format!(
-                    "{name} of {} is {value}, which would be {:.0} turns",
+                    "{name} of {} is {value}, {:.0} turns if it is in radians",
                     JOINT_LABELS[joint],
                     value.abs() / std::f64::consts::TAU
                 );
@@ -305,8 +304,8 @@ fn stretches(
     stretches.push(from..time_s.len());
     if let Some((longest_s, line)) = gaps.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0)) {
         notes.push(format!(
-            "{} gap{} in the clock, the longest of {longest_s:.3} s before line {line} (rows are \
-             {median_s:.4} s apart): nothing is put in their place, and motions end there",
+            "{} gap{} in the clock, the longest {longest_s:.3} s before line {line} (row interval \
+             {median_s:.4} s): not filled, motions end there",
             gaps.len(),
             if gaps.len() == 1 { "" } else { "s" }
         ));
@@ -314,7 +313,7 @@ fn stretches(
     stretches
 }
 
-/// Holds angles against speeds times time.
+/// Compares angles with speeds times time.
 fn pace(
     name: &str,
     time_s: &[f64],
@@ -342,20 +341,18 @@ fn pace(
     if (ratio - 1.0).abs() <= CLOCK_SLACK {
         return Ok(());
     }
-    let message = format!("angles change {ratio:.4} times as fast as {name} says");
+    let message = format!("angles change {ratio:.4} times as fast as {name}");
     let near = |wanted: f64| (ratio / wanted - 1.0).abs() < CLOCK_SLACK;
     let hint = if near(180.0 / std::f64::consts::PI) {
-        "angles are in degrees and speeds in radians: give a table of columns with the unit of each, \
-         --columns MAP.toml"
+        "angles are in degrees and speeds in radians: give the unit of each column with --columns MAP.toml"
     } else if near(std::f64::consts::PI / 180.0) {
-        "speeds are in degrees and angles in radians: give a table of columns with the unit of each, \
-         --columns MAP.toml"
+        "speeds are in degrees and angles in radians: give the unit of each column with --columns MAP.toml"
     } else if near(1e-3) {
-        "the clock is in milliseconds: say so with --time-unit ms"
+        "the clock is in milliseconds: give --time-unit ms"
     } else if near(1e3) {
-        "the clock is not in milliseconds: leave --time-unit out, or say s"
+        "the clock is not in milliseconds: omit --time-unit, or give s"
     } else {
-        "the clock is not that of the motion: two clocks, a wrong unit, or a replay at another speed; \
+        "the clock does not match the motion: two clocks, a wrong unit, or a replay at another speed; \
          name another clock with --time-column, or give --rate HZ if rows are evenly spaced"
     };
     Err((message, hint))
@@ -371,12 +368,12 @@ fn target(
     notes: &mut Vec<String>,
 ) -> Vec<JointState> {
     let qd = qd.unwrap_or_else(|| {
-        notes.push("no target_qd in the log: speeds are the slopes of target_q".to_owned());
+        notes.push("no target_qd in the log: speeds are derivatives of target_q".to_owned());
         slopes(time_s, &q, stretches)
     });
     let qdd = qdd.unwrap_or_else(|| {
         notes.push(
-            "no target_qdd in the log: accelerations are the slopes of the set-points' speeds"
+            "no target_qdd in the log: accelerations are derivatives of the set-point speeds"
                 .to_owned(),
         );
         slopes(time_s, &qd, stretches)
@@ -458,7 +455,7 @@ impl SimulatorSigns {
         {
             signs
                 .others
-                .push("the measured currents are the asked ones, bit for bit".to_owned());
+                .push("measured currents equal the target currents bit for bit".to_owned());
         }
         let constant = |range: Option<[f64; 2]>| {
             range
@@ -468,15 +465,15 @@ impl SimulatorSigns {
         if let Some(current_a) = constant(raw.robot_current_a) {
             signs
                 .others
-                .push(format!("the robot draws {current_a} A in every row"));
+                .push(format!("the robot current is {current_a} A in every row"));
         }
         if let Some([_, 0.0]) = raw.main_voltage_v {
-            signs.others.push("the mains have 0 V".to_owned());
+            signs.others.push("the main voltage is 0 V".to_owned());
         }
         if let Some(degrees) = constant(raw.temperature_c) {
-            signs
-                .others
-                .push(format!("all joints have {degrees} degrees C in every row"));
+            signs.others.push(format!(
+                "all joints are at {degrees} degrees C in every row"
+            ));
         }
         signs
     }
@@ -492,13 +489,13 @@ impl SimulatorSigns {
         if angles_are_set_points {
             others.insert(
                 0,
-                "the measured angles are the set-points, bit for bit".to_owned(),
+                "measured angles equal the set-points bit for bit".to_owned(),
             );
         } else if others.len() < ENOUGH {
             return (LogKind::Arm, None);
         }
         let note = format!(
-            "this is a simulator's log: {}; it shows the controller's model and nothing of an arm",
+            "simulator log: {}; it describes the controller's model, not an arm",
             others.join(", ")
         );
         (LogKind::Simulator, Some(note))

@@ -6,13 +6,14 @@ use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use needlebench_cell::{Finding, LogColumns, Separator, nearest_name, open_input};
+use needlebench_input::{Finding, Separator, nearest_name, open_input};
+use needlebench_scenario::LogColumns;
 use sha2::{Digest, Sha256};
 
 use crate::raw::RawLog;
 use crate::{Quantity, ReadOptions};
 
-/// Findings of a file beyond this many help nobody.
+/// Most findings of a file that are reported.
 const MOST_FINDINGS: usize = 10;
 
 /// No line of a log is longer, bytes.
@@ -22,7 +23,7 @@ const LONGEST_LINE: u64 = 1 << 20;
 const FIRST_LINES: usize = 50;
 
 const HEADER_HINT: &str = "the first line names the columns as UR's RTDE recorder does (timestamp, \
-     target_q_0 to _5, actual_q_0 ...); for other names give a table of columns: --columns MAP.toml";
+     target_q_0 to _5, actual_q_0 ...); map other names with --columns MAP.toml";
 
 /// Where a number of a row goes.
 #[derive(Debug, Clone, Copy)]
@@ -82,7 +83,7 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
         findings: Vec::new(),
     };
     let read = reader.table(&mut lines, options, bytes);
-    read.map_err(|error| cannot(error.to_string(), "is it a log of text?"))?;
+    read.map_err(|error| cannot(error.to_string(), "is it a text log?"))?;
     if reader.findings.is_empty() {
         let hash = lines.digest.finalize();
         let hash = hash
@@ -142,7 +143,7 @@ impl<R: Read> Lines<R> {
     /// The line as text, without its end.
     fn text(&self) -> std::io::Result<&str> {
         let text = std::str::from_utf8(&self.buffer).map_err(|_| {
-            let message = format!("line {} is no text", self.number);
+            let message = format!("line {} is not text", self.number);
             std::io::Error::new(std::io::ErrorKind::InvalidData, message)
         })?;
         Ok(text
@@ -193,7 +194,7 @@ impl Reader<'_> {
         }
         if separator.allows_decimal_comma() {
             self.raw.notes.push(format!(
-                "values are separated by {}; a comma in a number counts as its point",
+                "values are separated by {}; a comma in a number is a decimal comma",
                 separator.words()
             ));
         }
@@ -220,8 +221,8 @@ impl Reader<'_> {
             }
             if let Some((short, count)) = pending.take() {
                 let message = format!("the line has {count} values, the header {}", names.len());
-                let hint = "every line needs a value for every column; numbers with a decimal \
-                            comma need a semicolon between them";
+                let hint = "every line requires a value for every column; numbers with a decimal \
+                            comma must be separated by semicolons";
                 self.refuse(short, None, message, hint);
             }
             self.raw.rows_in_file += 1;
@@ -275,7 +276,7 @@ impl Reader<'_> {
         self.raw.line.reserve_exact(rows);
     }
 
-    /// Reads the cells that are wanted; how many the line has.
+    /// Reads the required cells; returns how many the line has.
     fn cells(&mut self, text: &str, numbers: &mut [f64], table: &Table<'_>, line: usize) -> usize {
         let mut count = 0;
         let mut last_is_empty = false;
@@ -287,7 +288,7 @@ impl Reader<'_> {
             let slot = &table.slots[at];
             let value = number(cell, table.separator.allows_decimal_comma());
             if value.is_none() && self.findings.len() < MOST_FINDINGS {
-                let mut finding = Finding::new(self.file, format!("`{cell}` is no number"))
+                let mut finding = Finding::new(self.file, format!("`{cell}` is not a number"))
                     .key(table.names[slot.column])
                     .hint("leave a cell empty, or write nan, where nothing was measured");
                 finding.line = Some(line);
@@ -315,14 +316,8 @@ impl Reader<'_> {
             if quantity == Quantity::Time {
                 clocks.push((column, *name));
             } else if found.insert((quantity, index), column).is_some() {
-                let hint =
-                    "take one of them out, or name the right one in a table: --columns MAP.toml";
-                self.refuse(
-                    line,
-                    Some(name),
-                    format!("there are two columns `{name}`"),
-                    hint,
-                );
+                let hint = "remove one of them, or name the right one with --columns MAP.toml";
+                self.refuse(line, Some(name), format!("duplicate column `{name}`"), hint);
             }
         }
         self.count_from_zero(&mut found);
@@ -340,7 +335,7 @@ impl Reader<'_> {
             }
             if there < quantity.width() {
                 self.raw.notes.push(format!(
-                    "{} is not used: it has {there} of {} columns",
+                    "{} is not used: {there} of {} columns present",
                     quantity.name(),
                     quantity.width()
                 ));
@@ -367,7 +362,7 @@ impl Reader<'_> {
         if !slots.iter().any(|slot| slot.quantity == Quantity::ActualQ) {
             let near = nearest_name("actual_q_0", names.iter().copied());
             let near = near.map_or(String::new(), |near| format!("is it `{near}`? "));
-            let message = "there are no columns actual_q_0 to actual_q_5".to_owned();
+            let message = "the columns actual_q_0 to actual_q_5 are missing".to_owned();
             self.refuse(line, None, message, &format!("{near}{HEADER_HINT}"));
         }
         slots
@@ -391,7 +386,7 @@ impl Reader<'_> {
         }
         if let Some(first) = shifted.first() {
             self.raw.notes.push(format!(
-                "columns are counted from 1: {0}_1 is the first joint's {0}",
+                "column numbers start at 1: {0}_1 is {0} of the first joint",
                 first.name()
             ));
         }
@@ -420,7 +415,7 @@ impl Reader<'_> {
             [] if options.rate_hz.is_some() => None,
             [] => {
                 let hint = "name its column with --time-column, give --rate HZ for evenly spaced \
-                            rows, or say which column is what: --columns MAP.toml";
+                            rows, or map the columns with --columns MAP.toml";
                 self.refuse(line, None, "the log has no clock".to_owned(), hint);
                 None
             }
@@ -430,12 +425,7 @@ impl Reader<'_> {
                     .map(|(_, name)| format!("`{name}`"))
                     .collect();
                 let message = format!("the log has {} clocks: {}", several.len(), found.join(", "));
-                self.refuse(
-                    line,
-                    None,
-                    message,
-                    "say which one counts: --time-column NAME",
-                );
+                self.refuse(line, None, message, "choose one with --time-column NAME");
                 None
             }
         }
@@ -467,7 +457,9 @@ impl Reader<'_> {
                             let finding = map.finding(key, message);
                             self.findings.push(match near {
                                 Some(near) => finding.hint(format!("did you mean `{near}`?")),
-                                None => finding.hint("names are those of the log's first line"),
+                                None => {
+                                    finding.hint("column names are in the first line of the log")
+                                }
                             });
                         }
                     }
@@ -478,7 +470,7 @@ impl Reader<'_> {
         let mut taken: Vec<usize> = slots.iter().map(|slot| slot.column).collect();
         taken.sort_unstable();
         if let Some(pair) = taken.windows(2).find(|pair| pair[0] == pair[1]) {
-            let message = format!("the column `{}` is named twice", names[pair[0]]);
+            let message = format!("the column `{}` is used twice", names[pair[0]]);
             self.findings.push(Finding::new(&map.file, message));
         }
         slots

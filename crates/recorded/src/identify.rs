@@ -1,4 +1,4 @@
-//! What an arm weighs, turns and rubs, from the torques and currents of a recorded run.
+//! Loads, rotor inertia and friction of an arm, from the torques and currents of a recorded run.
 //!
 //! Two fits of the same equation, each linear in what is sought but for gravity:
 //!
@@ -6,8 +6,8 @@
 //! torque = links(q, qd, qdd) + load(q, qd, qdd; m, m c) + J qdd  (+ sign(qd) Fc + qd Fv)
 //! ```
 //!
-//! - *the controller's belief*: `target_moment`, all rows, without friction. It gives the load that was
-//!   set, the rotors' inertia and the gravity that the controller reckons with. Links count as points
+//! - *the controller's model*: `target_moment`, all rows, without friction. It gives the load that was
+//!   set, the rotors' inertia and the gravity that the controller uses. Links count as points
 //!   at their centres, or with their tensors: whichever explains the run better, and both are reported.
 //! - *the arm*: torques as measured, or measured currents times torque constants, with friction, from
 //!   rows in which the joint moves: a joint at rest sticks, and its current says nothing of its torque.
@@ -42,7 +42,7 @@ pub(crate) const MOVING_RAD_S: f64 = 0.05;
 /// No UR arm carries more, kg: an estimate beyond is of a run that does not show the load.
 const HEAVIEST_KG: f64 = 100.0;
 
-/// Loads that are told apart; rows of further ones do not count.
+/// Most loads that are identified; rows of further ones do not count.
 const MOST_LOADS: usize = 8;
 
 /// Coarsest intervals, to each side, of what counts as identified: the larger of an absolute one and a
@@ -62,10 +62,10 @@ mod coarsest {
     pub const VISCOUS: (f64, f64) = (0.1, 0.3);
 }
 
-/// What a run says of torques.
+/// Identification results of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Identification {
-    /// What the controller believes, from `target_moment`.
+    /// The controller's model, from `target_moment`.
     pub controller: Option<ControllerFit>,
     /// How currents go with torques.
     pub current: Option<CurrentLaw>,
@@ -78,7 +78,7 @@ pub struct Identification {
 /// A load of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct IdentifiedLoad {
-    /// What the log says that the controller believed.
+    /// The load that the controller used, from the log.
     pub logged: Option<Load>,
     /// Mass, kg.
     pub mass_kg: Estimate,
@@ -86,7 +86,7 @@ pub struct IdentifiedLoad {
     pub centre_m: [Estimate; 3],
 }
 
-/// What the controller believes.
+/// The controller's model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ControllerFit {
     /// Inertia of the rotors at the joints, kg m^2.
@@ -97,7 +97,7 @@ pub struct ControllerFit {
     pub gravity_m_s2: Estimate,
     /// Whether links have inertia about their own centres.
     pub has_tensors: bool,
-    /// Root mean square of what is left of `target_moment`, N m.
+    /// RMS residual of `target_moment`, N m.
     pub rms_nm: [f64; JOINT_COUNT],
     /// The same of rows that the fit has not seen, N m.
     pub held_out_rms_nm: [f64; JOINT_COUNT],
@@ -108,7 +108,7 @@ pub struct ControllerFit {
     pub rms_by_data_nm: Option<[f64; JOINT_COUNT]>,
 }
 
-/// What the arm does.
+/// The arm's parameters.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeasuredFit {
     /// Where torques are from, in words.
@@ -125,7 +125,7 @@ pub struct MeasuredFit {
     pub gravity_m_s2: f64,
     /// Whether links have inertia about their own centres.
     pub has_tensors: bool,
-    /// Root mean square of what is left, N m.
+    /// RMS residual, N m.
     pub rms_nm: [f64; JOINT_COUNT],
     /// The same of rows that the fit has not seen, N m.
     pub held_out_rms_nm: [f64; JOINT_COUNT],
@@ -195,10 +195,10 @@ fn states<'a>(run: &'a RecordedRun, notes: &mut Vec<String>) -> std::borrow::Cow
     }
     let given = run.actual_qd.clone();
     if given.is_none() {
-        notes.push("speeds are the slopes of the measured angles".to_owned());
+        notes.push("speeds are derivatives of the measured angles".to_owned());
     }
     let qd = given.unwrap_or_else(|| slopes(&run.time_s, &run.actual_q, &run.stretches));
-    notes.push("accelerations are the slopes of the measured speeds".to_owned());
+    notes.push("accelerations are derivatives of the measured speeds".to_owned());
     let qdd = slopes(&run.time_s, &qd, &run.stretches);
     let states = run.actual_q.iter().zip(qd).zip(qdd);
     states
@@ -211,7 +211,7 @@ fn states<'a>(run: &'a RecordedRun, notes: &mut Vec<String>) -> std::borrow::Cow
         .into()
 }
 
-/// Loads that the log tells apart; one of which nothing is said where it says nothing.
+/// The distinct loads of the log; one unknown load where it has none.
 fn distinct_loads(run: &RecordedRun, notes: &mut Vec<String>) -> Vec<Option<Load>> {
     let mut loads: Vec<Option<Load>> = Vec::new();
     for (_, load) in &run.loads {
@@ -221,7 +221,7 @@ fn distinct_loads(run: &RecordedRun, notes: &mut Vec<String>) -> Vec<Option<Load
     }
     if loads.len() > MOST_LOADS {
         notes.push(format!(
-            "the log has {} loads: only the first {MOST_LOADS} count",
+            "the log has {} loads: only the first {MOST_LOADS} are used",
             loads.len()
         ));
         loads.truncate(MOST_LOADS);
@@ -286,7 +286,7 @@ fn measured(
             }
             let source = match meaning {
                 Effort::Torque => "measured torques",
-                Effort::Compensated => "measured torques without the share of gravity",
+                Effort::Compensated => "measured torques without gravity",
             };
             (source.to_owned(), torque_nm.clone())
         }
@@ -299,9 +299,8 @@ fn measured(
             usable = constants.map(|constant| constant.is_some());
             if !usable.contains(&true) {
                 notes.push(
-                    "torques of the arm are not identified: the log has currents, but torque \
-                     constants are neither in it (target_current with target_moment) nor in the \
-                     arm's data"
+                    "the arm's torques are not identified: the log has currents, but neither the log \
+                     (target_current with target_moment) nor the arm's data has torque constants"
                         .to_owned(),
                 );
                 return None;
@@ -314,7 +313,7 @@ fn measured(
             let mut source = "measured currents times the torque constants of this log".to_owned();
             if !of_data.is_empty() {
                 source = format!(
-                    "{source}, at {} those of the arm's data",
+                    "{source}, for {} those of the arm's data",
                     of_data.join(", ")
                 );
             }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
-use needlebench_cell::{Finding, open_input};
+use needlebench_input::{Finding, open_input};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_NAMES};
 use needlebench_ros::{JointState, NotAMessage, messages};
 use sha2::{Digest, Sha256};
@@ -12,9 +12,9 @@ use sha2::{Digest, Sha256};
 use crate::raw::RawLog;
 use crate::{EffortMeaning, Quantity, ReadOptions};
 
-const STILL_THERE: &str = "is it still there?";
+const STILL_THERE: &str = "does the file still exist?";
 
-const CUT_OFF: &str = "the file may be cut off: `mcap recover` mends what can be mended";
+const CUT_OFF: &str = "the file may be cut off; try to repair it with `mcap recover`";
 
 /// Whether a file is one of MCAP, by its first bytes.
 pub(crate) fn is_mcap(path: &Path) -> bool {
@@ -60,12 +60,12 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
         let number = raw.rows_in_file;
         let parsed = JointState::decode(message.encoding(), message.data());
         let state = parsed.map_err(|error| {
-            let message = format!("message {number} of {topic} is no joint state: {error}");
+            let message = format!("message {number} of {topic} is not a joint state: {error}");
             let hint = match error {
                 NotAMessage::Encoding(encoding) if encoding == "ros1" => {
-                    "messages of ROS 1 are not read: `rosbags-convert` makes a log of ROS 2 of a bag"
+                    "ROS 1 messages are not supported: convert the bag to ROS 2 with `rosbags-convert`"
                 }
-                _ => "joint states are read as CDR and as JSON",
+                _ => "supported encodings: CDR and JSON",
             };
             refuse(message, hint)
         })?;
@@ -73,7 +73,7 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
             let message = format!("message {number} of {topic} has two joints `{name}`");
             refuse(
                 message,
-                "record one arm a topic, or choose another one: --topic NAME",
+                "record one arm per topic, or choose another topic: --topic NAME",
             )
         })?
         else {
@@ -102,7 +102,7 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
             return Err(refuse(format!("cannot read the log: {error}"), CUT_OFF));
         }
         raw.notes.push(format!(
-            "the file breaks off after {} messages of {topic} ({error})",
+            "the file is cut off after {} messages of {topic} ({error})",
             raw.rows_in_file
         ));
     }
@@ -113,13 +113,13 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
     }
     if others > 0 {
         raw.notes.push(format!(
-            "{others} of {} messages of {topic} are of other joints: left out",
+            "{others} of {} messages of {topic} left out: other joints",
             raw.rows_in_file
         ));
     }
     if without_stamp > 0 {
         raw.notes.push(format!(
-            "{without_stamp} messages have no stamp: their times are when they were logged"
+            "{without_stamp} messages have no time stamp: log times are used"
         ));
     }
     name_effort(&file, &mut raw, options.effort)?;
@@ -144,13 +144,13 @@ fn name_effort(
         None => Err(vec![
             Finding::new(
                 file,
-                "`effort` of joint states of UR arms has had three meanings, and the log does not \
-                 say which",
+                "`effort` in joint states of UR arms has three possible meanings; the log does not \
+                 specify which",
             )
             .hint(
                 "--effort current (A: drivers for PolyScope before 5.23, and later ones by option), \
-                 --effort torque (N m, gravity included) or --effort compensated (N m without the \
-                 share of gravity: newer drivers)",
+                 --effort torque (N m, gravity included) or --effort compensated (N m without \
+                 gravity: newer drivers)",
             ),
         ]),
         Some(EffortMeaning::Current) => {
@@ -216,17 +216,17 @@ fn choose_topic(
         }
         (_, []) => refuse(
             "the log has no joint states".to_owned(),
-            "messages of sensor_msgs/JointState are read: record /joint_states".to_owned(),
+            "record sensor_msgs/JointState messages, such as /joint_states".to_owned(),
         ),
         (Some(wanted), names) if !names.contains(&wanted) => refuse(
             format!("the log has no joint states on `{wanted}`"),
-            format!("there are: {}", names.join(", ")),
+            format!("available: {}", names.join(", ")),
         ),
         (Some(wanted), _) => Ok((wanted.to_owned(), None)),
         (None, [only]) => Ok(((*only).to_owned(), None)),
         (None, several) if several.contains(&ROS_TOPIC) => {
             let note = format!(
-                "joint states are read from {ROS_TOPIC}; there are others, which --topic chooses: {}",
+                "joint states are read from {ROS_TOPIC}; choose another topic with --topic: {}",
                 several.join(", ")
             );
             Ok((ROS_TOPIC.to_owned(), Some(note)))
@@ -244,7 +244,7 @@ fn two_arms(file: &str, topic: &str, first: &str, other: &str) -> Vec<Finding> {
     let message = format!(
         "joint states of two arms are on {topic}: of `{first}{joint}` and of `{other}{joint}`"
     );
-    vec![Finding::new(file, message).hint("record one arm a topic: a log is of one arm")]
+    vec![Finding::new(file, message).hint("record one arm per topic")]
 }
 
 /// Places of the six joints among names, and the prefix that they have in common; none if one is missing.

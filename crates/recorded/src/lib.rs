@@ -1,9 +1,9 @@
-//! Recorded runs of real arms: read, checked, and what they say of the arm.
+//! Recorded runs of real arms: reading, checks, and identification of the arm.
 //!
-//! [`read_log`] makes a [`RecordedRun`] of a log; whatever is wrong or odd with it is said, and nothing
-//! is guessed. [`arm_fits`] says which arm it is of, [`calibrate`] how its links differ from the nominal
-//! ones, [`identify`] what it weighs and rubs. Each figure comes with an interval, or with why the run
-//! does not show it, and with the error on rows that it was not made from.
+//! [`read_log`] makes a [`RecordedRun`] of a log; errors and anomalies are reported, and nothing is guessed.
+//! [`arm_fits`] identifies the arm, [`calibrate`] how its links differ from the nominal ones, [`identify`]
+//! loads, rotor inertia and friction. Each value has a confidence interval, or the reason why the run does
+//! not determine it, and the error on held-out rows.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod arm_fit;
@@ -23,7 +23,7 @@ mod terms;
 
 use std::path::Path;
 
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 
 pub use arm_fit::{ArmFit, arm_fits};
 pub use calibration::{CalibratedLink, CalibrationFit, PoseError, calibrate};
@@ -39,7 +39,7 @@ pub use run::{Effort, Load, LogKind, LogSource, RecordedRun};
 /// Reads a log and checks its units, clock, gaps and modes.
 ///
 /// # Errors
-/// What is wrong with it, and what to say so that it can be read.
+/// What is wrong with it, and a hint to make it readable.
 pub fn read_log(path: &Path, options: &ReadOptions) -> Result<RecordedRun, Vec<Finding>> {
     let file = path.display().to_string();
     let is_mcap = joint_states::is_mcap(path);

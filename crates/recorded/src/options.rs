@@ -1,6 +1,6 @@
 //! What a user says of a log that the log does not.
 
-use needlebench_cell::LogColumns;
+use needlebench_scenario::LogColumns;
 
 /// What a user says of a log.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -13,7 +13,7 @@ pub enum Quantity {
     TargetQdd,
     /// The controller's rigid-body torques, without friction.
     TargetMoment,
-    /// Currents that the controller asks for.
+    /// Target currents of the controller.
     TargetCurrent,
     /// Joint angles as measured.
     ActualQ,

@@ -23,10 +23,10 @@ impl Cut {
     /// In words, of rows.
     pub fn words(self) -> &'static str {
         match self {
-            Self::NotFinite => "with an empty or not finite number",
+            Self::NotFinite => "with an empty or non-finite number",
             Self::RobotMode => "in which the robot was not running (robot_mode is not 7)",
             Self::SafetyMode => {
-                "in a protective stop or another safety mode than normal and reduced"
+                "in a protective stop or a safety mode other than normal and reduced"
             }
             Self::JointMode => "in which a joint was not running (joint_mode is not 253)",
             Self::Freedrive => "in which the teach button was pressed",
@@ -149,7 +149,7 @@ impl RawLog {
             let kept = 2 * missing <= rows || matches!(quantity, Quantity::Time);
             if !kept {
                 notes.push(format!(
-                    "{} is not used: it is empty or not finite in {missing} of {rows} rows",
+                    "{} is not used: empty or not finite in {missing} of {rows} rows",
                     quantity.name()
                 ));
                 return false;

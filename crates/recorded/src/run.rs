@@ -22,7 +22,7 @@ pub struct RecordedRun {
     pub actual_qd: Option<Vec<Joints>>,
     /// The controller's rigid-body torques, without friction.
     pub target_moment_nm: Option<Vec<Joints>>,
-    /// Currents that the controller asked for.
+    /// Target currents of the controller.
     pub target_current_a: Option<Vec<Joints>>,
     /// Currents as measured.
     pub actual_current_a: Option<Vec<Joints>>,
@@ -31,7 +31,7 @@ pub struct RecordedRun {
     /// Pose of the tool's point in `base` as the controller computes it from the measured angles:
     /// position and rotation vector.
     pub tcp: Option<Vec<[f64; 6]>>,
-    /// Loads that the controller believed in, each from a row on.
+    /// Loads that the controller used, each from a row on.
     pub loads: Vec<(usize, Load)>,
     /// Rows without a gap between them.
     pub stretches: Vec<Range<usize>>,
@@ -39,7 +39,7 @@ pub struct RecordedRun {
     pub kind: LogKind,
     /// Lowest and highest temperature of any joint, degrees C.
     pub temperature_c: Option<[f64; 2]>,
-    /// What was found while it was read; belongs in every report.
+    /// Notes from reading; belong in every report.
     pub notes: Vec<String>,
 }
 

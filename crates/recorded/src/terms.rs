@@ -160,9 +160,9 @@ pub(crate) fn point_inertia(mass_kg: f64, centre_m: &Vector3<f64>) -> [f64; 6] {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_cell::{Overrides, load_robot};
     use needlebench_kinematics::Dynamics;
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
+    use needlebench_scenario::{Overrides, load_robot};
 
     use super::*;
 

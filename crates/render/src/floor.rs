@@ -1,4 +1,4 @@
-//! The floor: a grid that fades out, with the soft shadow of what stands on it.
+//! The floor: a grid that fades out, with the soft shadow of the objects above it.
 
 use nalgebra::{Point2, Point3, Vector3};
 
@@ -57,7 +57,7 @@ impl Linear {
     }
 }
 
-/// What a place of the picture shows of the floor.
+/// The floor at a pixel of the picture.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FloorSample {
     pub nearness: f32,

@@ -1,16 +1,16 @@
 //! Images.
 
-/// What can go wrong with pictures.
+/// Errors of images.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
     /// The picture has no pixels, or more than PNG allows.
-    #[error("cannot encode a picture of {width_px} x {height_px} pixels: {source}")]
+    #[error("cannot encode an image of {width_px} x {height_px} pixels: {source}")]
     Encode {
         /// Width of the picture.
         width_px: usize,
         /// Height of the picture.
         height_px: usize,
-        /// What the encoder says.
+        /// Error of the encoder.
         source: png::EncodingError,
     },
 }
@@ -104,7 +104,7 @@ impl Image {
     /// The picture as the bytes of a PNG file.
     pub fn to_png(&self) -> Result<Vec<u8>, PictureError> {
         let encode = || {
-            // A side beyond 32 bits is refused by the encoder as a side of zero is.
+            // A side beyond 32 bits is rejected by the encoder as a side of zero is.
             let side = |pixels: usize| u32::try_from(pixels).unwrap_or(0);
             let mut bytes = Vec::new();
             let mut encoder =

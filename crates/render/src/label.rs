@@ -72,7 +72,7 @@ pub(crate) fn draw(image: &mut Image, labels: &[Label], view: &View) {
     }
 }
 
-/// Where a label would stand on its own, with the pixel that it points to.
+/// Position of a label without others, with the pixel that it points to.
 fn wanted(
     label: &Label,
     size: TextSize,

@@ -1,4 +1,4 @@
-//! Lamps, and how surfaces look in their light.
+//! Lights, and the shading of surfaces.
 
 use nalgebra::Vector3;
 
@@ -6,7 +6,7 @@ use crate::camera::View;
 use crate::color::Light;
 use crate::geometry::Material;
 
-/// Lamps that stand with the camera: a key light above its left shoulder, a fill light at its
+/// Lights that move with the camera: a key light above its left shoulder, a fill light at its
 /// right, and the sky.
 #[derive(Debug)]
 pub(crate) struct Lamps {

@@ -2,7 +2,7 @@
 //!
 //! [`render()`] turns a [`Scene`] seen by a [`Camera`] into an [`Image`], the same bytes for the same
 //! input. Opaque surfaces are seen from both sides; translucent ones (opacity below 1) from their
-//! outside only, blended back to front at every sample, so that what is within a translucent skin
+//! outside only, blended back to front at every sample, so that the inside of a translucent skin
 //! stays visible. Two by two samples per pixel smooth the edges. What cannot be drawn (vertices
 //! that are not finite, indices out of range, anything behind the camera) is left out.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]

@@ -59,7 +59,7 @@ pub fn render(scene: &Scene, camera: &Camera) -> Image {
     image
 }
 
-/// All that is seen, sample by sample.
+/// Everything visible, sample by sample.
 struct Frame {
     grid: Grid,
     materials: Vec<Material>,
@@ -246,9 +246,9 @@ impl Frame {
         self.materials.get(primitive.material as usize)
     }
 
-    /// Whether two neighbouring samples show things that a drawing would part by a line.
+    /// Whether two neighbouring samples show things that an outline separates.
     ///
-    /// Parts of one colour that merge, as the pieces of a bone or a link do, are not parted.
+    /// Parts of one colour that merge, as the pieces of a bone or a link do, are not separated.
     fn parted(&self, one: Nearest, other: Nearest) -> bool {
         if one.primitive == other.primitive {
             return false;

@@ -1,4 +1,4 @@
-//! What pictures show.
+//! Scenes: the contents of pictures.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use nalgebra::{Point2, Point3};
 use needlebench_geometry::TriangleMesh;
 use needlebench_kinematics::Pose;
 
-/// What a picture shows. Everything is in the world frame, z up.
+/// The contents of a picture. Everything is in the world frame, z up.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
     /// Solid and translucent surfaces.
@@ -50,11 +50,11 @@ pub struct Line3 {
 pub struct Label {
     /// The text, in Latin-1; other characters show as `?`.
     pub text: String,
-    /// Where it stands.
+    /// Its position.
     pub anchor: Anchor,
 }
 
-/// Where a label stands.
+/// Position of a label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Anchor {
     /// Beside a point of the world, in m, with a leader line to it; not drawn when the point is out

@@ -54,14 +54,16 @@ impl Logged {
     }
 }
 
-/// Why a file cannot be read on.
+/// Why reading a file fails.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// It does not follow the format, or a checksum does not fit.
     #[error(transparent)]
     Mcap(#[from] mcap::McapError),
     /// It does not hold as many bytes as it says.
-    #[error("the {what} at byte {at} is said to have {stated} bytes, and can have {most} at most")]
+    #[error(
+        "the {what} at byte {at} states a length of {stated} bytes; at most {most} are possible"
+    )]
     Length {
         /// What it is of.
         what: &'static str,
@@ -269,7 +271,7 @@ fn record(input: &mut impl Read) -> io::Result<(u8, u64)> {
 
 /// Why a file cannot be made.
 #[derive(Debug, thiserror::Error)]
-#[error("the MCAP file cannot be made: {0}")]
+#[error("cannot create the MCAP file: {0}")]
 pub struct WriteError(#[from] mcap::McapError);
 
 /// Quality of service of topics whose last message is for whoever comes later, as `rosbag2` keeps it with a channel:

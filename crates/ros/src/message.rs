@@ -66,7 +66,7 @@ impl Stamp {
         }
     }
 
-    /// Seconds; none where nobody set it.
+    /// Seconds; none where it is not set.
     pub fn seconds(self) -> Option<f64> {
         (self != Self::default()).then(|| f64::from(self.sec) + f64::from(self.nanosec) * 1e-9)
     }
@@ -98,13 +98,13 @@ pub struct JointState {
     pub effort: Vec<f64>,
 }
 
-/// Why bytes are no message of the type that they should be.
+/// Why bytes are not a message of the expected type.
 #[derive(Debug, thiserror::Error)]
 pub enum NotAMessage {
     /// CDR that ends too early.
     #[error("it is cut off")]
     CutOff,
-    /// JSON that is none, or of something else.
+    /// Invalid JSON, or JSON of something else.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
     /// Bytes of another kind: `ros1`, `protobuf`.

@@ -7,12 +7,13 @@ mod monte_carlo;
 mod within;
 
 use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, Vector3};
-use needlebench_cell::imperfections::{Breathing, Imperfections, SkinMarkers};
-use needlebench_cell::{Cell, Goal, ResolvedScenario};
+use needlebench_cell::Cell;
 use needlebench_engine::Servo;
 use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_scenario::imperfections::{Breathing, Imperfections, SkinMarkers};
+use needlebench_scenario::{Goal, ResolvedScenario};
 use serde::Serialize;
 
 use crate::truth::only;
@@ -27,8 +28,7 @@ pub struct BudgetCase<'a> {
     pub goal: &'a Goal,
     /// The phantom's planned place, if there is one.
     pub place: Option<&'a Pose>,
-    /// The servo. Where it believes in another gravity than the cell has, the bias of every source has what
-    /// that does.
+    /// The servo. Where it assumes another gravity than the cell has, the bias of every source has what that does.
     pub servo: &'a Servo,
     /// All imperfections.
     pub imperfections: &'a Imperfections,
@@ -66,7 +66,7 @@ impl BudgetCase<'_> {
         self.trajectory.end()
     }
 
-    /// Pose of the guide's exit that the controller believes in, world.
+    /// Pose of the guide's exit that the controller assumes, world.
     fn world_from_exit(&self) -> Pose {
         self.cell.robot.world_from_flange(&self.target()) * self.cell.tool.flange_from_guide_exit
     }
@@ -112,8 +112,8 @@ pub enum BudgetError {
 
 /// Bias and covariance of a point of the needle, real minus where it should be.
 ///
-/// Axes are those of the goal's guide exit at roll 0, the same for all configurations: x and y across
-/// the needle, x as near to the patient's head as it gets, z along the insertion.
+/// Axes are those of the goal's guide exit at roll 0, the same for all configurations: x and y lateral to the needle, x
+/// as near to the patient's head as it gets, z along the insertion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Moments {
     /// Mean, m.
@@ -122,7 +122,7 @@ pub struct Moments {
     pub covariance_m2: [[f64; 3]; 3],
     /// Root mean square distance, m: `sqrt(|bias|^2 + trace)`.
     pub rms_m: f64,
-    /// Root mean square distance across the needle, m.
+    /// Root mean square distance lateral to the needle, m.
     pub lateral_rms_m: f64,
 }
 
@@ -170,9 +170,9 @@ pub struct PointBudget {
     pub analytic: Moments,
     /// By many draws, each settled and measured as a run is; none if no samples were asked for.
     pub monte_carlo: Option<Moments>,
-    /// Distance that the point stays within in 95 % of all cases, m, by the analytic moments with the breath and the play
-    /// in the guide as they are distributed: known to 0.2 %. Of all sources together alone, and none without samples,
-    /// which it is held against.
+    /// Distance that the point stays within in 95 % of all cases, m, by the analytic moments with the breath and the
+    /// play in the guide as they are distributed: known to 0.2 %. Of all sources together alone, and none without
+    /// samples, which it is compared with.
     pub radius_95_m: Option<f64>,
     /// The draws' own, m: the two between which it is with a confidence of 95 %.
     pub drawn_radius_95_m: Option<[f64; 2]>,

@@ -1,7 +1,7 @@
 //! Standard variables: normal and uniform ones, drawn one by one or as a Latin hypercube.
 
-use needlebench_kinematics::normal;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::normal;
+use needlebench_numerics::random::SplitMix64;
 
 /// Distribution of a standard variable; both are symmetric about 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,12 +1,12 @@
 //! The fit by which the controller registers the phantom, and what errors of its markers do to it.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6};
-use needlebench_cell::imperfections::{Localisation, Markers};
 use needlebench_kinematics::Pose;
 use needlebench_kinematics::registration::{
     Localised, RegistrationError, displacement_covariance, register, register_weighted,
     transform_covariance,
 };
+use needlebench_scenario::imperfections::{Localisation, Markers};
 
 /// The pose that the controller's fit gives the markers where they are seen at `places_m`: all alike, or each by
 /// the inverse of its measured covariance.

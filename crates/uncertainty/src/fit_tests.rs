@@ -1,7 +1,7 @@
 //! Errors of weighted fits against the closed form, against the fit's own covariance, and against simulation.
 
-use needlebench_kinematics::random::NormalPairs;
 use needlebench_kinematics::registration::{expected_tre_rms_m, tre_covariance};
+use needlebench_numerics::random::NormalPairs;
 
 use super::*;
 
@@ -158,7 +158,8 @@ fn simulated_fits_have_the_covariance_and_the_mean_of_second_order() {
     );
 }
 
-/// Markers that moved otherwise than the fit believes: its weights are wrong then, and what it leaves goes with its turn.
+/// Markers that moved otherwise than the fit assumes: its weights are wrong then, and what it leaves goes with its
+/// turn.
 #[test]
 fn simulated_fits_of_shifted_markers_do_as_well() {
     let shift_m = 3e-3;

@@ -2,8 +2,8 @@
 
 use nalgebra::Matrix6;
 use needlebench_engine::{ClosedLoop, Servo};
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Dynamics, Joints};
+use needlebench_numerics::random::SplitMix64;
 
 use crate::Truth;
 use crate::distribution::Variable;

@@ -7,9 +7,9 @@
 //!      +--many draws, the same way as one--> the same        } error budget
 //! ```
 //!
-//! A [`Truth`] is one arm and one patient: what the engines simulate. The [`budget`] says how far the
-//! needle's tip is off over all arms and patients, by source, analytically and by Monte Carlo; the
-//! two share no formula but the model of each source. `tests/validation/budget` shares neither.
+//! A [`Truth`] is one arm and one patient: what the engines simulate. The [`budget`] is the error budget of the
+//! needle's tip over the arm and patient population, by source, analytically and by Monte Carlo; the two share no
+//! formula but the model of each source. `tests/validation/budget` shares neither.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 pub mod budget;

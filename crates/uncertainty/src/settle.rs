@@ -159,7 +159,7 @@ impl LateTurn {
     }
 
     /// Error of the joint at rest, rad: reference minus position, with a servo of `kp`, bristles of `stiffness`, and
-    /// friction that is `factor` of what the controller believes.
+    /// friction that is `factor` of what the controller assumes.
     ///
     /// Slow: at every step the servo, the controller's compensation and the bristles are in balance,
     /// `kp x + c = h`, while the bristles follow the joint, `dh/dq = stiffness (1 - h sign(dq) / F)`. Viscous
@@ -221,7 +221,7 @@ fn balance(
 
 /// Error of the joints at rest by friction, rad: reference minus position.
 ///
-/// `kp`: position gains, N m/rad; `factor`: from the friction that the controller believes in to the true one.
+/// `kp`: position gains, N m/rad; `factor`: from the friction that the controller assumes to the true one.
 pub(crate) fn friction_error(
     kp: &Joints,
     friction: &JointFriction,
@@ -243,7 +243,7 @@ pub(crate) fn friction_error(
 /// How far a joint springs back, in the direction against its motion, when compensation is taken
 /// away from bent bristles.
 ///
-/// On the way back the bristles follow `dz/dx = 1 + z / z_ss`, so after a way `d` they hold
+/// As the joint springs back the bristles follow `dz/dx = 1 + z / z_ss`, so after a way `d` they hold
 /// `F (2 exp(-d / z_ss) - 1)`: the balance is `2 F (1 - exp(-d / z_ss)) + kp d = c`.
 fn spring_back_rad(held_nm: f64, compensated_nm: f64, kp: f64, stiffness: f64) -> f64 {
     /// Newton steps on a concave, increasing function from 0: quadratic from the first.
@@ -275,9 +275,7 @@ pub struct Settled {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SettleError {
     /// A drive cannot carry the arm.
-    #[error(
-        "the drive of {joint} has to hold {torque_nm:.2} N m and gives {limit_nm:.2} N m at most"
-    )]
+    #[error("the drive of {joint} must hold {torque_nm:.2} N m, its limit is {limit_nm:.2} N m")]
     Overloaded {
         /// Label of the joint.
         joint: &'static str,
@@ -287,7 +285,7 @@ pub enum SettleError {
         limit_nm: f64,
     },
     /// A servo without position gain holds no place.
-    #[error("the position gain of {joint} is 0: nothing holds it")]
+    #[error("the position gain of {joint} is 0: the joint is not held")]
     NoStiffness {
         /// Label of the joint.
         joint: &'static str,

@@ -3,14 +3,15 @@
 use std::ops::Range;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
-use needlebench_cell::imperfections::{
-    self, ArmPopulation, Breathing, GearTwist, Imperfections, Markers, NeedleBending,
-};
-use needlebench_cell::{BodyKind, Cell, Goal, PlacedPhantom};
+use needlebench_cell::{BodyKind, Cell};
 use needlebench_engine::{Actuation, CommandTiming, Encoder, JointFriction};
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::{Body, Chain, Dynamics, JOINT_COUNT, Joints, Pose};
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::imperfections::{
+    self, AbsorbedSag, ArmPopulation, Breathing, GearTwist, Imperfections, Markers, NeedleBending,
+};
+use needlebench_scenario::{Goal, PlacedPhantom};
 use serde::Serialize;
 
 use crate::distribution::{Variable, hypercube};
@@ -194,7 +195,7 @@ impl Layout {
                     Source::Elasticity => {
                         let elasticity = imperfections.elasticity.as_ref();
                         let absorbed = elasticity.and_then(|each| each.absorbed.as_ref());
-                        let modes = absorbed.map_or(0, |absorbed| absorbed.modes.len());
+                        let modes = absorbed.map_or(0, |_| AbsorbedSag::MODES);
                         add(JOINT_COUNT + modes, Variable::Normal);
                     }
                     Source::Friction => add(JOINT_COUNT, Variable::Normal),
@@ -281,7 +282,7 @@ pub struct Truth {
     pub needle_m: [Vector2<f64>; 2],
     /// Where the target really is beside where the image shows it, world, m.
     pub unseen_m: Vector3<f64>,
-    /// Force across the needle's tip, guide frame, N, and the needle.
+    /// Lateral force at the needle's tip, guide frame, N, and the needle.
     pub side_force: Option<(Vector2<f64>, NeedleBending)>,
     /// Motion of skin and target along the insertion, m.
     pub indented_m: [f64; 2],

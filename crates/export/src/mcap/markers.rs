@@ -40,7 +40,7 @@ pub(super) fn cell(motion: &Motion<'_>) -> MarkerArray {
     MarkerArray(all)
 }
 
-/// What is shown of a body; the space behind the guide is none.
+/// Colour of a kind of body; none for the access zone, which is not a body and not shown.
 fn colour(kind: BodyKind) -> Option<Colour> {
     Some(Colour(match kind {
         BodyKind::Base | BodyKind::Link => [0.62, 0.66, 0.72, 1.0],

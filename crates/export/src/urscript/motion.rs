@@ -17,7 +17,7 @@ const DECIMALS: usize = 9;
 /// Half of the last decimal in all joints, and rounding, at the reach of any arm, m.
 const ROUNDING_M: f64 = 1e-8;
 
-/// How far `servoj` looks ahead, s, and how stiffly it follows: the maker's defaults.
+/// How far `servoj` looks ahead, s, and how stiffly it follows: the manufacturer's defaults.
 const LOOKAHEAD_S: f64 = 0.1;
 const GAIN: u32 = 300;
 
@@ -70,13 +70,13 @@ impl Kind {
     }
 }
 
-/// The planned motion as a program: straight joint motions as `movej` without blending, others as `servoj` at the
+/// The planned motion as a program: joint-space lines as `movej` without blending, other motions as `servoj` at the
 /// controller's period. It states the path of the guide's exit and what is proven of its clearance.
 ///
 /// # Errors
 /// [`ExportError::NoPeriod`] for an arm whose data do not say how often its controller takes set-points.
 pub fn motion_script(motion: &Motion<'_>, name: &str) -> Result<ExportedFile, ExportError> {
-    let robot = &motion.resolved.cell.robot;
+    let robot = &motion.resolved.robot_description;
     let control = robot
         .arm
         .as_ref()
@@ -85,7 +85,7 @@ pub fn motion_script(motion: &Motion<'_>, name: &str) -> Result<ExportedFile, Ex
         Some(control) => control.period_ms * 1e-3,
         None => {
             return Err(ExportError::NoPeriod {
-                arm: robot.arm_name(),
+                arm: robot.arm_name.clone(),
             });
         }
     };
@@ -200,8 +200,8 @@ fn write_script(
     }
     writeln!(
         out,
-        "  popup(\"The guide is where the needle goes in, as planned. The way back is not part of this program.\", \
-         title=\"At the needle\", blocking=True)\n  halt"
+        "  popup(\"The guide is at the planned insertion pose. The retreat is not included in this \
+         program.\", title=\"At the needle\", blocking=True)\n  halt"
     )?;
     write_path(out, motion, moves, period_s)?;
     writeln!(out, "end")
@@ -284,20 +284,20 @@ fn head(motion: &Motion<'_>, moves: &[Move], period_s: f64) -> String {
         acceleration[joint] = resolved.motion.acceleration[joint];
     }
     format!(
-        "Motion of a {arm} that brings a needle guide to where the needle goes in.\n\
+        "Motion of a {arm} that brings a needle guide to the insertion pose.\n\
          NEVER RUN ON A ROBOT: {NEVER_RUN}.\n\
          {origin}\n\
          \n\
          READ THIS BEFORE YOU RUN IT\n\
-         - It knows the cell of the scenario and nothing else: compare the scenario with the real room, the\n\
-         \x20 patient, cables, hoses, people and the floor first. Not with a patient: it is no medical device.\n\
-         - First run: without anybody, speed slider at 10 %, nobody within reach, a hand at the emergency stop.\n\
+         - It accounts for the scenario's cell only: compare the scenario with the real room, the\n\
+         \x20 patient, cables, hoses, people and the floor first. Never use it with a patient: not a medical device.\n\
+         - First run: speed slider at 10 %, all people out of reach, a hand at the emergency stop.\n\
          - It starts at the start posture, met to {at_start_deg:.0} deg, and goes slowly to it first.\n\
-         - Payload and TCP are set by this program. Afterwards load your installation again.\n\
+         - Payload and TCP are set by this program. Afterwards reload your installation.\n\
          - movej without blending follows the straight joint path that was planned, under the controller's own\n\
          \x20 profile. servoj is given the planned joint positions; the arm lags behind them and smooths them: how\n\
          \x20 far it strays from the path by that is not known here.\n\
-         - It ends where the needle goes in. The way back is not part of it.\n\
+         - It ends at the insertion pose. The retreat is not included.\n\
          \n\
          Payload: {mass:.4} kg, centre at ({x:.2}, {y:.2}, {z:.2}) mm from the flange.\n\
          TCP: exit of the guide, ({tx:.3}, {ty:.3}, {tz:.3}) mm from the flange.\n\
@@ -305,11 +305,11 @@ fn head(motion: &Motion<'_>, moves: &[Move], period_s: f64) -> String {
          Limits of joint speed (deg/s): {speed}\n\
          Limits of joint acceleration (deg/s^2): {acceleration}\n\
          Takes about {total_s:.2} s at 100 %.\n\
-         Proven least clearance of the nominal arm and tool along the path, whatever the speed, less the\n\
+         Certified minimum clearance of the nominal arm and tool along the path, at any speed, minus the\n\
          {stray_um:.2} um that the program strays from the planned path at most:\n\
          {proven}\n\
-         The expected path of the guide's exit stands at the end of the program.",
-        arm = motion.resolved.cell.robot.arm_name(),
+         The expected path of the guide exit is at the end of the program.",
+        arm = motion.resolved.robot_description.arm_name,
         mass = tool.body.mass_kg,
         tx = exit_mm.x,
         ty = exit_mm.y,

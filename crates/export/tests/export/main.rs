@@ -6,8 +6,8 @@ mod urdf;
 
 use std::path::Path;
 
-use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
 use needlebench_export::{ExportError, ExportedFile, Packing, Shown};
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 
 /// A cell with obstacles of meshes, people and a gantry, hanging.
 fn hanging() -> ResolvedScenario {

@@ -1,9 +1,10 @@
 //! Logs with something wrong: each is said, and nothing is guessed.
 
-use needlebench_cell::{Finding, LogColumns};
+use needlebench_input::Finding;
 use needlebench_recorded::{
     AngleUnit, LogKind, ReadOptions, RecordedRun, TimeUnit, arm_fits, read_log,
 };
+use needlebench_scenario::LogColumns;
 
 use crate::common::{Sheet, read_text, shipped, shipped_text};
 
@@ -246,7 +247,7 @@ fn a_simulators_log_is_told() {
         let run = read_text(&sheet.text(), &ReadOptions::default()).unwrap();
         assert_eq!(run.kind, LogKind::Simulator);
         let told = |note: &String| {
-            note.contains("are the set-points, bit for bit")
+            note.contains("equal the set-points bit for bit")
                 && note.contains(&format!("{current_a} A in every row"))
         };
         assert!(run.notes.iter().any(told), "{:?}", run.notes);

@@ -4,11 +4,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 use needlebench_cell::Robot;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::trajectory::JointState;
 use needlebench_kinematics::{
     Body, Chain, Dynamics, Joints, Pose, base_from_base_link, rotation_vector,
 };
+use needlebench_numerics::random::SplitMix64;
 use needlebench_recorded::{KnownArm, ReadOptions, calibrate, identify};
 
 use crate::common::{read_text, robot};

@@ -3,8 +3,9 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use needlebench_cell::{Overrides, Robot, load_robot};
+use needlebench_cell::Robot;
 use needlebench_recorded::{ReadOptions, RecordedRun, read_log};
+use needlebench_scenario::{Overrides, load_robot};
 
 /// The recorded run of a real UR3e that ships with its data.
 pub fn shipped() -> PathBuf {
@@ -24,13 +25,14 @@ pub fn robot(arm: &str) -> Robot {
         ..Overrides::default()
     })
     .unwrap()
+    .robot
 }
 
 /// Reads a text as a log.
 pub fn read_text(
     text: &str,
     options: &ReadOptions,
-) -> Result<RecordedRun, Vec<needlebench_cell::Finding>> {
+) -> Result<RecordedRun, Vec<needlebench_input::Finding>> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     std::fs::write(&path, text).unwrap();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use mcap::Writer;
 use mcap::records::MessageHeader;
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 use needlebench_kinematics::JOINT_NAMES;
 use needlebench_recorded::{Effort, EffortMeaning, ReadOptions, RecordedRun, read_log};
 
@@ -69,12 +69,7 @@ fn file(topics: &[&str], effort: f64, cut: usize) -> tempfile::TempDir {
             .add_channel(schema, topic, "cdr", &BTreeMap::new())
             .unwrap();
         for k in 0..100 {
-            let header = MessageHeader {
-                channel_id: channel,
-                sequence: k,
-                log_time: u64::from(k) * 2_000_000 + 7,
-                publish_time: 0,
-            };
+            let header = header(channel, k);
             let time_s = 100.0 + 0.002 * f64::from(k);
             let data = cdr(time_s, &positions(k), &[effort; 6], "ur3e_");
             writer.write_to_known_channel(&header, &data).unwrap();
@@ -159,6 +154,16 @@ fn a_file_that_breaks_off_is_refused_or_read_as_far_as_it_goes() {
     }
 }
 
+/// Head of the message `k` of a channel, 2 ms after the one before.
+fn header(channel_id: u16, k: u32) -> MessageHeader {
+    MessageHeader {
+        channel_id,
+        sequence: k,
+        log_time: u64::from(k) * 2_000_000 + 7,
+        publish_time: 0,
+    }
+}
+
 /// Messages of two arms by turns on one topic, in records of the file or in chunks.
 fn messages(encoding: &str, prefixes: [&str; 2], options: mcap::WriteOptions) -> Vec<u8> {
     let mut writer = options.create(std::io::Cursor::new(Vec::new())).unwrap();
@@ -169,12 +174,7 @@ fn messages(encoding: &str, prefixes: [&str; 2], options: mcap::WriteOptions) ->
         .add_channel(schema, "/joint_states", encoding, &BTreeMap::new())
         .unwrap();
     for k in 0..100 {
-        let header = MessageHeader {
-            channel_id: channel,
-            sequence: k,
-            log_time: u64::from(k) * 2_000_000 + 7,
-            publish_time: 0,
-        };
+        let header = header(channel, k);
         let prefix = prefixes[k as usize % 2];
         let data = cdr(
             100.0 + 0.002 * f64::from(k),
@@ -262,7 +262,7 @@ fn lengths_that_lie_are_refused_before_there_is_room_for_them() {
             let findings = read_bytes(bytes).unwrap_err();
             let text = &findings[0].message;
             assert!(
-                text.contains("is said to have"),
+                text.contains("states a length of"),
                 "{index}, {length}: {text}"
             );
         }

@@ -153,7 +153,7 @@ fn a_calibration_from_too_few_poses_is_not_kept() {
     few.tcp.as_mut().unwrap().truncate(60);
     few.actual_q.truncate(60);
     few.time_s.truncate(60);
-    let mut random = needlebench_kinematics::random::SplitMix64::new(1);
+    let mut random = needlebench_numerics::random::SplitMix64::new(1);
     for pose in few.tcp.as_mut().unwrap() {
         for value in &mut pose[..3] {
             *value += random.uniform(-1e-4, 1e-4);

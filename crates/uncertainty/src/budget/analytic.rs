@@ -1,8 +1,10 @@
 //! The budget by Jacobians.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, SymmetricEigen, Vector3};
-use needlebench_cell::imperfections::{ArmPopulation, Imperfections, OriginDeviations};
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints, Pose};
+use needlebench_scenario::imperfections::{
+    AbsorbedSag, ArmPopulation, Imperfections, OriginDeviations,
+};
 
 use super::within::Errors;
 use super::{BudgetCase, BudgetError, Moments};
@@ -292,10 +294,10 @@ fn elasticity(
     let absorbed = elasticity.absorbed.as_deref();
     let columns = (0..JOINT_COUNT).map(|joint| {
         let sags = jacobian * (joints.followed.column(joint) * joints.sag_spread[joint]);
-        let taken = absorbed.map_or_else(Vector3::zeros, |absorbed| moved(&absorbed.mean[joint]));
+        let taken = absorbed.map_or_else(Vector3::zeros, |absorbed| moved(&absorbed.mean()[joint]));
         sags + taken * elasticity.spread
     });
-    let modes = absorbed.map_or(&[][..], |absorbed| &absorbed.modes);
+    let modes = absorbed.map_or(&[][..], AbsorbedSag::modes);
     let columns = columns.chain(modes.iter().map(moved));
     columns.map(|column| column * column.transpose()).sum()
 }

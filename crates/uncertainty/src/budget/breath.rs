@@ -1,6 +1,6 @@
 //! Moments of how far the breath has moved.
 
-use needlebench_cell::imperfections::Breathing;
+use needlebench_scenario::imperfections::Breathing;
 
 /// Mean and variance of `sin^4(pi phase)`: by its Fourier series under a normal or uniform phase.
 pub(super) fn breath_moments(breathing: &Breathing) -> (f64, f64) {

@@ -1,9 +1,9 @@
 //! The budget by many draws: each one an arm and a patient, settled and measured as in a run.
 
 use nalgebra::{Matrix3, Vector3};
-use needlebench_cell::imperfections::Imperfections;
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::imperfections::Imperfections;
 
 use super::{BudgetCase, BudgetError, Moments};
 use crate::jitter::Jitter;

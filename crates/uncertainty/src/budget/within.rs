@@ -1,8 +1,8 @@
 //! How far from where it should be a point of the needle stays with a given probability.
 
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, Vector3};
-use needlebench_cell::imperfections::Breathing;
-use needlebench_kinematics::normal;
+use needlebench_numerics::normal;
+use needlebench_scenario::imperfections::Breathing;
 
 use super::Moments;
 use super::breath::breath_moments;
@@ -208,7 +208,7 @@ fn quantile(points: &[Point], spread_m: f64, probability: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     use super::*;
 

@@ -1,8 +1,8 @@
 //! The two ways to the error budget agree.
 
 use crate::common::{ALL, POSTURES, imperfect, motion_to, servo};
-use needlebench_cell::imperfections::ArmPopulation;
 use needlebench_kinematics::Chain;
+use needlebench_scenario::imperfections::ArmPopulation;
 use needlebench_uncertainty::Source;
 use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, Samples, SourceBudget, budget};
 

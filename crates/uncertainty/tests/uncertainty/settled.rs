@@ -2,11 +2,11 @@
 
 use crate::common::{ALL, POSTURES, imperfect, motion_to, servo};
 use nalgebra::{UnitVector3, Vector3};
-use needlebench_cell::ResolvedScenario;
 use needlebench_engine::{Hooks, JointFriction, RapierPlant, RapierSettings, simulate};
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::trajectory::{JointPath, JointTrajectory, Phase};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::ResolvedScenario;
 use needlebench_uncertainty::{Layout, Truth, settle_after};
 
 const TIMESTEP_S: f64 = 1e-3;

@@ -1,8 +1,8 @@
 //! Where a lesion really is does not depend on what was believed of it.
 
 use nalgebra::Vector3;
-use needlebench_cell::Goal;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::Goal;
 use needlebench_uncertainty::{Layout, Truth};
 
 use crate::common::imperfect;

@@ -4,10 +4,10 @@
 
 use std::path::Path;
 
-use needlebench_cell::{Overrides, ResolvedScenario, resolve_scenario};
 use needlebench_engine::{Servo, ServoGains};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
+use needlebench_scenario::{Overrides, ResolvedScenario, resolve_scenario};
 
 /// Every effect that has a block, with its defaults.
 pub const ALL: &str = "
