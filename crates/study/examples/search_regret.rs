@@ -7,7 +7,7 @@
 
 use std::cell::RefCell;
 
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use needlebench_study::search::{
     CaseWorth, ChoiceAxis, Choices, Generation, Judge, Objective, SearchPlan, search,
 };

@@ -2,7 +2,7 @@
 
 use crate::CaseResult;
 
-/// Why a case has no rows: the environment failed, not the case. A layout that cannot exist is a
+/// Why a case has no rows: the environment failed, not the case. An invalid layout is a
 /// result ([`Outcome::Invalid`](crate::Outcome::Invalid)).
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("case {case}: {message}")]

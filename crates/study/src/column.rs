@@ -1,4 +1,4 @@
-//! What a study measures: the columns of its table, given by whoever computes its rows.
+//! What a study measures: the columns of its table, given by the worker that computes its rows.
 
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +34,7 @@ pub struct MetricColumn {
     pub spread: bool,
     /// Whether the worst cases are named, and studies of the same cases are compared case by case.
     pub by_case: bool,
-    /// What it stands for; of several columns that a row has the last counts.
+    /// Its role in the statistics; of several columns that a row has the last counts.
     pub measure: Option<Measure>,
     /// Key of the study's criteria that is on it.
     pub criterion: Option<String>,
@@ -43,12 +43,12 @@ pub struct MetricColumn {
 /// Beginning of the keys of the needle's distance from bone, vessels and organs, the same for all configurations.
 const ROUTE_KEY: &str = "needle_route";
 
-/// Which columns stand for what.
+/// The roles of columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Measures {
     clearance: Vec<usize>,
     tip_error: Vec<usize>,
-    /// Columns of the needle's distance, and the least that is asked about.
+    /// Columns of the needle path's clearance, and the required value.
     route: Option<(Vec<usize>, f64)>,
 }
 
@@ -66,14 +66,14 @@ impl Measures {
         }
     }
 
-    /// With how far the needle is to keep away from bone, vessels and organs, mm.
+    /// With the required clearance of the needle path from bone, vessels and organs, mm.
     pub(crate) fn with_route(mut self, columns: &[MetricColumn], least_mm: Option<f64>) -> Self {
         let found = indices(columns, |column| column.key.starts_with(ROUTE_KEY));
         self.route = least_mm.map(|least_mm| (found, least_mm));
         self
     }
 
-    /// Whether the needle of a layout keeps away as far as is asked about; none where nobody asks, or nothing is known.
+    /// Whether the needle path of a layout has the required clearance; none where it is not required or not known.
     pub(crate) fn keeps_away(&self, rows: &[Row]) -> Option<bool> {
         let (columns, least_mm) = self.route.as_ref()?;
         let mut known = rows

@@ -1,7 +1,7 @@
 //! From the number of a case to the values of its factors.
 
-pub use needlebench_cell::study::Role;
-use needlebench_cell::study::{
+pub use needlebench_scenario::study::Role;
+use needlebench_scenario::study::{
     Distribution, FactorValues, ResolvedStudy, SamplingMethod, StudyFactor,
 };
 use serde::{Deserialize, Serialize};
@@ -16,9 +16,9 @@ pub struct Factor {
     pub name: String,
     /// Unit, from the key (`mm`, `deg`); empty if it has none.
     pub unit: String,
-    /// Whether it is ours to choose.
+    /// Control or noise factor.
     pub role: Role,
-    /// Whether its values are a sample: drawn by the sampling, or seeds of draws. A continuum always is.
+    /// Whether its values are a sample: sampled points, or seeds of draws. A continuum always is.
     pub sampled: bool,
     /// Its values.
     pub kind: FactorKind,

@@ -1,7 +1,7 @@
-//! What continuous factors are drawn from.
+//! Distributions of continuous factors.
 
-use needlebench_cell::study::{Distribution, NormalSection};
-use needlebench_kinematics::normal;
+use needlebench_numerics::normal;
+use needlebench_scenario::study::{Distribution, NormalSection};
 
 /// Share of a distribution on either side that counts as beyond its ends.
 const TAIL: f64 = 1e-3;

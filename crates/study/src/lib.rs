@@ -15,7 +15,6 @@ mod results;
 mod row;
 mod sampling;
 pub mod search;
-mod sobol;
 pub mod statistics;
 mod store;
 

@@ -4,21 +4,21 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 
-/// What became of a configuration.
+/// The outcome of a configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]
 pub enum Outcome {
-    /// It works and meets all criteria.
+    /// Feasible, meets all criteria.
     Ok = 0,
-    /// It works but misses a criterion, which [`Row::detail`] names.
+    /// Not rejected, but fails a criterion, which [`Row::detail`] names.
     Failed = 1,
     /// A rule rejects it, which [`Row::detail`] names.
     Rejected = 2,
-    /// The layout cannot exist; [`Row::detail`] is the key that is at fault.
+    /// The layout is invalid; [`Row::detail`] is the invalid key.
     Invalid = 3,
-    /// It works and misses no criterion that could be judged, but one could not be, or an engine could not carry out
-    /// its motion; [`Row::detail`] names which.
+    /// Not rejected and fails no criterion that could be evaluated, but one could not be, or an engine could not
+    /// execute its motion; [`Row::detail`] names which.
     NotJudged = 4,
 }
 
@@ -52,9 +52,8 @@ pub struct Row {
     pub configuration: u8,
     /// What became of it.
     pub outcome: Outcome,
-    /// The rule or criterion that it breaks, as `collision robot_phantom` or
-    /// `max_tip_position_error_mm`; the key at fault of an invalid layout; what could not be judged, as `engine_failure
-    /// rapier`; empty if it is ok.
+    /// The rule or criterion that it fails, as `collision robot_phantom` or `max_tip_position_error_mm`; the key at
+    /// fault of an invalid layout; what could not be evaluated, as `engine_failure rapier`; empty if it is ok.
     pub detail: Cow<'static, str>,
     /// Values of the study's columns; NaN where a row has none, and none beyond the last.
     pub values: Vec<f32>,

@@ -1,9 +1,9 @@
 //! Points of the unit cube for the factors that are sampled.
 
-use needlebench_cell::study::SamplingMethod;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::study::SamplingMethod;
 
-use crate::sobol::{DIMENSIONS, SobolDimension};
+use needlebench_numerics::sobol::{DIMENSIONS, SobolDimension};
 
 /// Most dimensions of the methods: those of Sobol's table.
 pub(crate) fn most_dimensions(method: SamplingMethod) -> usize {

@@ -1,6 +1,6 @@
-//! What two studies are compared by, and the losses that are allowed.
+//! Quantities that two studies are compared by, and the thresholds of regressions.
 
-use needlebench_cell::digits_apart;
+use needlebench_input::digits_apart;
 
 use crate::MetricColumn;
 
@@ -20,24 +20,24 @@ pub struct StudyRate {
     pub more_is_better: bool,
 }
 
-/// Share of the valid layouts in which any configuration is ok.
+/// Share of the valid layouts with a feasible configuration.
 pub(crate) const WORKING_LAYOUTS: StudyRate = StudyRate {
     name: "working_layouts",
-    words: "layouts that work",
+    words: "feasible layouts",
     of_configurations: false,
     more_is_better: true,
 };
-/// Share of the valid layouts in which a configuration is ok.
+/// Share of the valid layouts in which a configuration is feasible.
 pub(crate) const SUCCESS_RATE: StudyRate = StudyRate {
     name: "success_rate",
     words: "success rate",
     of_configurations: true,
     more_is_better: true,
 };
-/// Share of the cases whose layout cannot exist.
+/// Share of the cases with an invalid layout.
 pub(crate) const INVALID_LAYOUTS: StudyRate = StudyRate {
     name: "invalid_layouts",
-    words: "layouts that cannot exist",
+    words: "invalid layouts",
     of_configurations: false,
     more_is_better: false,
 };
@@ -45,7 +45,7 @@ pub(crate) const INVALID_LAYOUTS: StudyRate = StudyRate {
 /// The rates by which studies are compared, in the order of reports.
 pub const STUDY_RATES: [StudyRate; 3] = [WORKING_LAYOUTS, SUCCESS_RATE, INVALID_LAYOUTS];
 
-/// What a threshold is on.
+/// The quantity of a threshold.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StudySubject {
     /// A rate.
@@ -57,7 +57,7 @@ pub enum StudySubject {
 /// How much worse a number of the second study may be.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyThreshold {
-    /// What it is on.
+    /// Its quantity.
     pub subject: StudySubject,
     /// [`BEST`](crate::statistics::BEST), [`EVERY`] or a configuration's label; none of layouts.
     pub of: Option<String>,
@@ -70,11 +70,14 @@ pub struct StudyThreshold {
 }
 
 impl StudyThreshold {
-    /// A loss that is more than allowed, in brackets, with the digits that show it.
+    /// A regression beyond its threshold, in brackets, with enough digits to show it.
     pub(crate) fn loss_text(&self, loss: f64, first: f64, unit: &str) -> String {
         match (self.limit, unit) {
             (StudyLimit::Absolute(limit), "1") => {
-                format!(" ({} points)", digits_apart(100.0 * loss, 100.0 * limit))
+                format!(
+                    " ({} percentage points)",
+                    digits_apart(100.0 * loss, 100.0 * limit)
+                )
             }
             (StudyLimit::Absolute(limit), unit) => {
                 format!(" ({} {unit})", digits_apart(loss, limit))
@@ -90,7 +93,7 @@ impl StudyThreshold {
     }
 }
 
-/// A limit of a loss.
+/// The limit of a regression.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StudyLimit {
     /// In the unit of the metric's column.
@@ -100,7 +103,7 @@ pub enum StudyLimit {
 }
 
 impl StudyLimit {
-    /// Whether a loss from the first value is more than allowed.
+    /// Whether a regression from the first value exceeds the limit.
     pub fn is_exceeded_by(self, loss: f64, first: f64) -> bool {
         match self {
             Self::Absolute(limit) => loss > limit,

@@ -26,9 +26,9 @@ pub const COMPARISON_VERSION: u32 = 1;
 pub struct StudyComparison {
     /// Version of the keys.
     pub schema_version: u32,
-    /// Whether nothing was lost beyond what is allowed.
+    /// Whether there is no regression beyond the thresholds.
     pub pass: bool,
-    /// What was, if anything.
+    /// The regressions.
     pub failures: Vec<StudyFailure>,
     /// The first study.
     pub a: StudySide,
@@ -61,14 +61,14 @@ pub struct StudySide {
     pub layouts: u64,
 }
 
-/// What a failed comparison lost.
+/// A regression.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct StudyFailure {
     /// Key of the metric, or name of the rate.
     pub metric: String,
     /// Configuration, or `best`; none of layouts.
     pub of: Option<String>,
-    /// Threshold that was exceeded; none where more than chance was lost without one.
+    /// Threshold that was exceeded; none of a significant regression without one.
     pub threshold: Option<String>,
     /// In words.
     pub detail: String,
@@ -97,12 +97,12 @@ pub struct Change {
     pub b: Option<f64>,
     /// Its 95 % interval.
     pub b_interval: Option<Interval>,
-    /// Second less first.
+    /// Second minus first.
     pub change: Option<f64>,
     /// By how much the second is worse; negative where it is better.
     pub loss: Option<f64>,
-    /// Whether the two differ by more than chance: by the paired test of rates of the same cases, else
-    /// where the intervals do not overlap.
+    /// Whether the difference is significant: by the paired test of rates of the same cases, else where
+    /// the intervals do not overlap.
     pub beyond_chance: bool,
 }
 
@@ -119,18 +119,18 @@ pub struct ThresholdResult {
     pub loss: Option<f64>,
     /// Unit of the loss.
     pub unit: String,
-    /// Whether the loss is allowed.
+    /// Whether the regression is within the threshold.
     pub pass: bool,
     /// In words.
     pub detail: String,
 }
 
-/// What to compare with and what to allow.
+/// Thresholds and options of a comparison.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct StudyCompareOptions {
-    /// Losses that are allowed.
+    /// Thresholds.
     pub thresholds: Vec<StudyThreshold>,
-    /// A rate that fell by more than chance does not fail the comparison unless a threshold says so.
+    /// A significantly lower rate does not fail the comparison unless a threshold does.
     pub allow_status_change: bool,
     /// Cases and metrics that only the first has do not fail the comparison.
     pub allow_lost: bool,
@@ -197,10 +197,10 @@ impl<'a> StudyPair<'a> {
 
     /// Compares the two.
     ///
-    /// The comparison fails where a loss is more than a threshold allows, and, unless that is allowed,
-    /// where the share of layouts that work or the success rate of a configuration is less by more
-    /// than chance and no threshold is on it; and, unless that is allowed, where the second has fewer
-    /// cases or no values of a metric that the first has.
+    /// The comparison fails where a regression exceeds a threshold, and, unless that is allowed, where
+    /// the share of feasible layouts or the success rate of a configuration is significantly lower and
+    /// has no threshold; and, unless that is allowed, where the second has fewer cases or no values of
+    /// a metric that the first has.
     pub fn compare(self, options: &StudyCompareOptions) -> StudyComparison {
         let [a, b] = self.studies;
         let [summary_a, summary_b] = &self.summaries;
@@ -236,7 +236,7 @@ impl<'a> StudyPair<'a> {
     }
 }
 
-/// The thresholds with what they were held against, and those that were exceeded.
+/// The thresholds with their values, and those that were exceeded.
 fn held(
     both: &Both<'_>,
     options: &StudyCompareOptions,
@@ -275,10 +275,7 @@ fn lost(a: &Summary, b: &Summary) -> Vec<StudyFailure> {
     let mut failures = Vec::new();
     let (before, now) = (a.overall.cases, b.overall.cases);
     if now < before {
-        let detail = format!(
-            "{} of {before} cases are missing in the second study",
-            before - now
-        );
+        let detail = format!("{} of {before} cases are missing in study B", before - now);
         failures.push(failure("cases", detail));
     }
     let has_values = |summary: &Summary, key: &str| {
@@ -290,14 +287,14 @@ fn lost(a: &Summary, b: &Summary) -> Vec<StudyFailure> {
     };
     for column in &a.metrics {
         if has_values(a, &column.key) && !has_values(b, &column.key) {
-            let detail = format!("{}: the second study has no values", column.words);
+            let detail = format!("{}: study B has no values", column.words);
             failures.push(failure(&column.key, detail));
         }
     }
     failures
 }
 
-/// Rates that fell by more than chance and have no threshold.
+/// Significantly lower rates that have no threshold.
 fn lost_rates(
     both: &Both<'_>,
     options: &StudyCompareOptions,
@@ -320,7 +317,7 @@ fn lost_rates(
                 metric: change.metric.clone(),
                 of: change.of.clone(),
                 threshold: None,
-                detail: format!("{}, more than by chance", in_words(change)),
+                detail: format!("{}, statistically significant", in_words(change)),
                 cases: both.cases(Compared::Rate(rate), change.of.as_deref()),
             });
         }
@@ -370,7 +367,6 @@ fn judged(threshold: &StudyThreshold, change: &Change) -> ThresholdResult {
         (Some(loss), Some(first)) => !threshold.limit.is_exceeded_by(loss, first),
         _ => false,
     };
-    let allowed = if pass { "" } else { ", more than" };
     ThresholdResult {
         threshold: threshold.key.clone(),
         limit: threshold.text.clone(),
@@ -383,20 +379,20 @@ fn judged(threshold: &StudyThreshold, change: &Change) -> ThresholdResult {
             (Some(first), Some(_)) => {
                 let loss =
                     threshold.loss_text(change.loss.unwrap_or_default(), first, &change.unit);
-                format!("{}{allowed} {}{loss}", in_words(change), threshold.text)
+                format!("{}{loss}, limit {}", in_words(change), threshold.text)
             }
             (None, None) => format!("{}: neither study has values", what(change)),
-            (None, Some(_)) => format!("{}: the first study has no values", what(change)),
-            (Some(_), None) => format!("{}: the second study has no values", what(change)),
+            (None, Some(_)) => format!("{}: study A has no values", what(change)),
+            (Some(_), None) => format!("{}: study B has no values", what(change)),
         },
     }
 }
 
-/// `5 % quantile of clearance of best`.
+/// `P5 clearance of the best configuration`.
 pub fn what(change: &Change) -> String {
-    let quantile = change.quantile.map_or(String::new(), |p| {
-        format!("{} % quantile of ", short(100.0 * p))
-    });
+    let quantile = change
+        .quantile
+        .map_or(String::new(), |p| format!("P{} ", short(100.0 * p)));
     let of = match change.of.as_deref() {
         None => String::new(),
         Some(BEST) => " of the best configuration".to_owned(),
@@ -426,10 +422,13 @@ fn in_words(change: &Change) -> String {
     let loss = change.loss.unwrap_or_default();
     let way = if loss > 0.0 { "worse" } else { "better" };
     let by = if loss == 0.0 {
-        "the same".to_owned()
+        "unchanged".to_owned()
     } else {
-        let points = if change.unit == "1" { "points " } else { "" };
-        format!("{} {points}{way}", value_text(loss.abs(), &change.unit))
+        let size = match change.unit.as_str() {
+            "1" => format!("{:.2} percentage points", 100.0 * loss.abs()),
+            unit => value_text(loss.abs(), unit),
+        };
+        format!("{size} {way}")
     };
     format!(
         "{}: {} -> {}, {by}",
@@ -484,7 +483,7 @@ impl<'a> Both<'a> {
         found.map(|each| &each.success)
     }
 
-    /// Cases that show a loss.
+    /// Cases that show a regression.
     fn cases(&self, compared: Compared<'_>, of: Option<&str>) -> Vec<u64> {
         if let Some(transition) = self.transition(compared, of) {
             return transition.lost_cases.clone();

@@ -19,7 +19,7 @@ const PROBABILITIES: [f64; 7] = [0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0];
 /// Cases that travel together.
 const BLOCK: usize = 512;
 
-/// Below this, chance does not explain a difference.
+/// Significance level.
 const SIGNIFICANCE: f64 = 0.05;
 
 /// The same cases in two studies.
@@ -37,7 +37,7 @@ pub struct Paired {
     pub working: Transition,
     /// By configuration.
     pub configurations: Vec<ConfigurationTransition>,
-    /// Second value less first, by configuration and metric, the best configurations last.
+    /// Second value minus first, by configuration and metric, the best configurations last.
     pub differences: Vec<PairedDifference>,
 }
 
@@ -51,7 +51,7 @@ pub struct ConfigurationTransition {
     pub success: Transition,
 }
 
-/// What became of a success.
+/// Change of a success between two studies.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Transition {
     /// Layouts in which it is so in both studies.
@@ -69,9 +69,9 @@ pub struct Transition {
     /// 95 % interval of `gained_share - lost_share`, from random groups of the sampled points; none of
     /// a single point.
     pub change_interval: Option<Interval>,
-    /// Whether the test and the interval agree that it became worse by more than chance.
+    /// Whether it became significantly worse, by both the test and the interval.
     pub worse: bool,
-    /// Whether they agree that it became better.
+    /// Whether it became significantly better.
     pub better: bool,
     /// First cases that were lost.
     pub lost_cases: Vec<u64>,
@@ -92,11 +92,11 @@ pub struct PairedDifference {
     pub unit: String,
     /// Layouts in which both studies have it and neither rejects the configuration.
     pub count: u64,
-    /// Mean of second less first.
+    /// Mean of second minus first.
     pub mean: f64,
     /// 95 % interval of the mean, from random groups of the sampled points.
     pub mean_interval: Option<Interval>,
-    /// Quantiles of second less first.
+    /// Quantiles of second minus first.
     pub quantiles: Vec<QuantileValue>,
     /// Cases with the largest losses, and by how much the second is worse.
     pub losses: Vec<CaseValue>,
@@ -287,7 +287,7 @@ pub(super) fn paired(
             }
         })?;
         if let Some(case) = different {
-            return Ok(Err(format!("case {case} has other values of its factors")));
+            return Ok(Err(format!("factor values of case {case} differ")));
         }
         for stream in &mut streams {
             stream.quantiles.next_pass();
@@ -354,7 +354,7 @@ impl Stream {
 /// Why the cases of two studies cannot be the same.
 fn different_design(a: &dyn Results, b: &dyn Results) -> Option<String> {
     if a.cases() != b.cases() {
-        return Some(format!("{} cases against {}", a.cases(), b.cases()));
+        return Some(format!("{} and {} cases", a.cases(), b.cases()));
     }
     let (first, second) = (a.factors(), b.factors());
     if first.len() != second.len() {
@@ -363,16 +363,16 @@ fn different_design(a: &dyn Results, b: &dyn Results) -> Option<String> {
             names.join(", ")
         };
         return Some(format!(
-            "other factors: {} against {}",
+            "factors differ: {} and {}",
             names(first),
             names(second)
         ));
     }
     let other = first.iter().zip(second).find(|(a, b)| a != b)?;
     Some(if other.0.name == other.1.name {
-        format!("factor `{}` has other values", other.0.name)
+        format!("values of factor `{}` differ", other.0.name)
     } else {
-        format!("factor `{}` against `{}`", other.0.name, other.1.name)
+        format!("factors `{}` and `{}`", other.0.name, other.1.name)
     })
 }
 

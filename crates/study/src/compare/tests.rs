@@ -198,7 +198,7 @@ fn other_cases_are_compared_by_their_intervals() {
         fewer
             .unpaired_because
             .unwrap()
-            .contains("1500 cases against 1000")
+            .contains("1500 and 1000 cases")
     );
     // Every fifth layout lost is more than chance without pairs too.
     let found = compared(&a, &study(2, 1500, 0.0, 0.1, 5), &[]);

@@ -1,11 +1,11 @@
-//! What there is to choose.
+//! The control factors of a search.
 
 use crate::FactorValue;
 
-/// A value of each factor to choose, in their order.
+/// A value of each control factor, in their order.
 pub type Candidate = Vec<FactorValue>;
 
-/// A factor to choose.
+/// A control factor.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ChoiceAxis {
     /// One of so many.
@@ -19,11 +19,11 @@ pub enum ChoiceAxis {
     },
 }
 
-/// The factors to choose: combinations of the finite ones, and for each of them a unit cube of those with ranges.
+/// The control factors: combinations of the finite ones, and for each of them a unit cube of those with ranges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choices(pub Vec<ChoiceAxis>);
 
-/// Steps of a range between which candidates are not told apart, at least.
+/// Fewest steps that a range is resolved into.
 const STEPS: f64 = 1000.0;
 
 impl Choices {

@@ -5,8 +5,8 @@
 //! if it had been drawn there. All draws come from the seed by number of generation, point and coordinate.
 //! Only the order of the better half of a generation counts: what the worse half is worth need not be known.
 
-use needlebench_kinematics::normal;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::normal;
+use needlebench_numerics::random::SplitMix64;
 
 /// A distribution of points in the unit cube, and what it has learnt.
 #[derive(Debug, Clone)]

@@ -1,4 +1,4 @@
-//! Finite choices: halving, and racing.
+//! Finite control factors: halving, and racing.
 
 use super::log::{Decision, Purpose};
 use super::pool::{Found, Pool};
@@ -7,7 +7,7 @@ use super::{ALPHA, Choices, FEWEST, FINALISTS, Judge, SearchError, SearchPlan};
 /// Most candidates that are listed.
 const MOST_CANDIDATES: usize = 100_000;
 
-/// So many candidates are judged with so many circumstances.
+/// So many candidates are evaluated under so many circumstances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Round {
     pub circumstances: u64,
@@ -103,7 +103,7 @@ fn planned_for<S>(plan: &SearchPlan, count: usize) -> Result<Vec<Round>, SearchE
     )
 }
 
-/// [`affordable`] rounds, or an error that says what the budget has no room for.
+/// [`affordable`] rounds, or an error that the budget is too small.
 pub(super) fn planned<S>(
     candidates: usize,
     plan: &SearchPlan,
@@ -118,7 +118,7 @@ pub(super) fn planned<S>(
     })
 }
 
-/// Number of candidates of finite choices.
+/// Number of candidates of finite control factors.
 pub(super) fn listed<S>(choices: &Choices) -> Result<usize, SearchError<S>> {
     let combinations = choices.combinations().unwrap_or(usize::MAX);
     if combinations > MOST_CANDIDATES {
@@ -130,7 +130,7 @@ pub(super) fn listed<S>(choices: &Choices) -> Result<usize, SearchError<S>> {
     Ok(combinations)
 }
 
-/// Rounds of halving; whoever is told from the best goes at once.
+/// Rounds of halving; candidates significantly worse than the best are eliminated at once.
 pub(super) fn race<J: Judge>(
     pool: &mut Pool<'_, J>,
     mut alive: Vec<usize>,

@@ -1,15 +1,15 @@
-//! What a search has done, and its answer.
+//! The log of a search, and its answer.
 
 use serde::{Deserialize, Serialize};
 
 use super::Stream;
 use super::objective::{Estimate, Objective};
 
-/// What a generation is for.
+/// The purpose of a generation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Purpose {
-    /// A first look at points spread over ranges.
+    /// Screening of points spread over ranges.
     Screening,
     /// Points of an evolution strategy.
     Evolution,
@@ -17,7 +17,7 @@ pub enum Purpose {
     Halving,
     /// The last candidates, with all circumstances.
     Final,
-    /// The winner, on circumstances that nothing was compared by.
+    /// The winner, on held-out circumstances.
     Fresh,
 }
 
@@ -26,14 +26,13 @@ pub enum Purpose {
 pub struct CandidateLog {
     /// Its number.
     pub id: usize,
-    /// Its choices, by the names of factors.
+    /// Its values of the control factors, by name.
     pub choice: Vec<(String, serde_json::Value)>,
-    /// Common circumstances that it was judged under.
+    /// Number of common circumstances that it was evaluated under.
     pub cases: u64,
-    /// Its figures under those, of the first objective and the second; intervals are no better than those of one who
-    /// was not selected.
+    /// Its estimates under those, of the first objective and the second; intervals do not account for the selection.
     pub figures: Vec<Estimate>,
-    /// The share of its layouts that work.
+    /// Its success rate.
     pub rate: Estimate,
 }
 
@@ -42,16 +41,16 @@ pub struct CandidateLog {
 pub struct CandidateStanding {
     /// Its number.
     pub id: usize,
-    /// Its figures by all circumstances up to those of the generation; none of what cannot exist.
+    /// Its estimates by all circumstances up to those of the generation; none where invalid layouts decide them.
     pub figures: Vec<Option<f64>>,
 }
 
-/// A generation, and what became of its candidates.
+/// A generation with its candidates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GenerationLog {
     /// Its number.
     pub generation: u32,
-    /// What for.
+    /// Its purpose.
     pub purpose: Purpose,
     /// Which circumstances.
     pub stream: Stream,
@@ -63,54 +62,54 @@ pub struct GenerationLog {
     pub candidates: Vec<CandidateStanding>,
 }
 
-/// What was decided between generations.
+/// A decision between generations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Decision {
     /// Number of generations before it.
     pub after: u32,
-    /// What for.
+    /// Its purpose.
     pub purpose: Purpose,
-    /// Circumstances that it rests on.
+    /// Number of circumstances that it is based on.
     pub circumstances: u64,
-    /// Who stays, the best first.
+    /// Candidates that stay, the best first.
     pub kept: Vec<usize>,
-    /// Who was told from the best.
+    /// Candidates significantly worse than the best.
     pub told_apart: Vec<usize>,
-    /// Who was dropped by order alone: they may be as good.
+    /// Candidates eliminated by order alone: they may be equivalent.
     pub dropped: Vec<usize>,
-    /// Who could not be among the kept ones by reach alone, and whose clearances were never asked for.
+    /// Candidates eliminated by reachability alone, whose clearances were not computed.
     pub ruled_out: Vec<usize>,
 }
 
-/// A candidate that is on the front, or may be.
+/// A candidate that is Pareto-optimal, or may be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrontMember {
     /// Its number.
     pub id: usize,
-    /// Whether it is on the front by its estimates.
+    /// Whether it is Pareto-optimal by its estimates.
     pub by_estimate: bool,
-    /// Whether it is for certain: each other one is worse in an objective for certain. All pairs and both
-    /// objectives together are wrong with a chance of at most 5 %.
+    /// Whether it is significantly so: each other one is significantly worse in an objective. Family-wise error rate
+    /// 5 % over all pairs and both objectives.
     pub is_certain: bool,
-    /// Figures on fresh circumstances; none of those that were not judged anew.
+    /// Estimates on held-out circumstances; none of candidates that were not re-evaluated.
     pub fresh: Option<Vec<Estimate>>,
 }
 
 /// The answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
-    /// Number of the best candidate; of a front that which is best in the first objective.
+    /// Number of the best candidate; of a front the one that is best in the first objective.
     pub winner: usize,
-    /// Its figures on circumstances that nothing was compared by: estimates and intervals of those alone.
+    /// Its estimates with confidence intervals, from the held-out circumstances alone.
     pub figures: Vec<Estimate>,
-    /// The share of layouts that work, on the same.
+    /// Its success rate, on the same.
     pub rate: Estimate,
-    /// Its figures on those that it was selected by, which look better than they are.
+    /// Its estimates on the circumstances that it was selected by, optimistically biased.
     pub selected_by: Vec<Estimate>,
-    /// Who cannot be told from it, of those that have all circumstances, the best first and the winner among them; empty
-    /// with two objectives, which have a front.
+    /// Finalists not significantly different from it, the best first, with the winner among them; empty with two
+    /// objectives, which have a front.
     pub equals: Vec<usize>,
-    /// Who was dropped with fewer circumstances and could not be told from the best of their round.
+    /// Candidates eliminated earlier that were not significantly different from the best of their round.
     pub undecided: Vec<usize>,
     /// The front of two objectives.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
@@ -118,7 +117,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Whether there is something to recommend: the best candidate works in some layout that nothing was compared by.
+    /// Whether there is a recommendation: the best candidate is feasible in some held-out layout.
     pub fn is_recommended(&self) -> bool {
         self.rate.value.is_some_and(|rate| rate > 0.0)
     }
@@ -131,16 +130,16 @@ pub struct SearchLog {
     pub objectives: Vec<Objective>,
     /// Circumstances of the last candidates.
     pub samples: u64,
-    /// Circumstances that the winner is judged on.
+    /// Held-out circumstances that the winner is evaluated on.
     pub fresh: u64,
     /// Most cases.
     pub budget: u64,
     /// Cases that were computed.
     pub cases: u64,
-    /// Cases that were not computed, since reach alone had ruled their candidates out: in so many layouts no
-    /// configuration comes to the needle. They count against the budget.
+    /// Cases that were not computed, because reachability alone eliminated their candidates. They count against the
+    /// budget.
     pub cases_spared: u64,
-    /// Candidates that reach alone ruled out, and that were not judged later after all.
+    /// Candidates eliminated by reachability alone and not evaluated later.
     pub ruled_out: usize,
     /// The candidates.
     pub candidates: Vec<CandidateLog>,

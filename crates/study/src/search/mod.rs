@@ -1,18 +1,20 @@
-//! The best choice looked for instead of listed.
+//! Optimisation of a study's control factors.
 //!
-//! A *candidate* is a value of each factor with `role = "choice"`; a *circumstance* is a sampled point of all
-//! other factors, goals included, the same one for all candidates (common random points), so that what a
-//! hard layout does to all of them drops out of their differences. What a case is worth is asked of a [`Judge`], generation by generation;
-//! this module knows neither robots nor files, and what it asks depends on the seed and the answers alone.
+//! A *candidate* is a value of each control factor (`role = "choice"`); a *circumstance* is a sampled point of the
+//! noise factors, goals included, the same one for all candidates (common random points), so that the common effect
+//! of a difficult layout cancels in their differences. A [`Judge`] evaluates the cases, generation by generation; this
+//! module knows neither robots nor files, and its requests depend on the seed and the answers alone.
 //!
-//! - Finite choices: successive halving (Karnin, Koren and Somekh, ICML 2013), with twice the circumstances in
-//!   each round; whoever can be told from the best is dropped at once, and the last round says who cannot.
-//! - Choices with ranges: a first look at points spread over them, then [`CmaEs`] from the best of those, on its own
-//!   for each combination of the finite ones, of which the worse half is dropped as the budget goes; the best distinct candidates are raced as finite ones are.
-//! - Two objectives: finite choices, or points spread over ranges, halved by layers of the Pareto front.
+//! - Finite control factors: successive halving (Karnin, Koren and Somekh, ICML 2013), with twice the circumstances in
+//!   each round; candidates significantly worse than the best are eliminated at once, and the last round gives the tied
+//!   ones.
+//! - Control factors with ranges: screening of points spread over them, then [`CmaEs`] from the best of those, separate
+//!   for each combination of the finite ones, the worse half of which is dropped as the budget is used; the best
+//!   distinct candidates are raced as finite ones are.
+//! - Two objectives: finite control factors, or points spread over ranges, halved by layers of the Pareto front.
 //!
-//! The winner is judged again on circumstances that nothing was compared by: of many candidates the one that looks best
-//! looks better than it is. Those are independent points, and intervals are of them alone.
+//! The winner is evaluated again on held-out circumstances, because the best of many candidates is optimistically
+//! biased. These are independent points, and confidence intervals are from them alone.
 
 mod choices;
 mod cma;
@@ -38,37 +40,37 @@ pub use space::{GenerationDesign, SearchSpace, SpaceError};
 
 use pool::Pool;
 
-/// Most candidates of the last round, unless more were asked for.
+/// Most candidates of the last round, unless more were requested.
 const FINALISTS: usize = 8;
 
-/// Chance that the best is told from the winner, over all rounds.
+/// Probability that the best differs significantly from the winner, over all rounds.
 const ALPHA: f64 = 0.05;
 
-/// Circumstances of the first round of halving, at least.
+/// Fewest circumstances of the first round of halving.
 const FEWEST: u64 = 8;
 
-/// What is looked for, and at what cost.
+/// Objective and cost of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchPlan {
     /// What candidates are compared by.
     pub objective: Objective,
-    /// Another objective, of which the front is wanted.
+    /// A second objective, for a Pareto front.
     pub second: Option<Objective>,
     /// Circumstances of the last round.
     pub samples: u64,
-    /// Circumstances that the winner is judged on.
+    /// Held-out circumstances that the winner is evaluated on.
     pub fresh: u64,
     /// Most cases.
     pub budget: u64,
-    /// Seed of the draws of the search itself.
+    /// Seed of the search's own random numbers.
     pub seed: u64,
 }
 
 impl SearchPlan {
-    /// Whether the budget is large enough for such choices.
+    /// Whether the budget is large enough for such control factors.
     ///
     /// # Errors
-    /// [`SearchError::Budget`] with the least that is, or too many combinations.
+    /// [`SearchError::Budget`] with the least sufficient budget, or too many combinations.
     pub fn check<S>(&self, choices: &Choices) -> Result<(), SearchError<S>> {
         if self.second.is_some() {
             pareto::check(self, choices)
@@ -86,11 +88,11 @@ impl SearchPlan {
 pub enum Stream {
     /// Those that candidates are compared by.
     Common,
-    /// Those that nothing was compared by.
+    /// Held-out ones.
     Fresh,
 }
 
-/// Cases that are wanted: each of some candidates under each of some circumstances.
+/// Requested cases: each of some candidates under each of some circumstances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Generation {
     /// Its number, from 0.
@@ -116,25 +118,25 @@ impl Generation {
     }
 }
 
-/// What cases are worth. By candidate, then circumstance; it may depend on nothing else.
+/// Evaluates cases, by candidate, then circumstance; the outcome may depend on nothing else.
 pub trait Judge {
-    /// Why it does not go on.
+    /// Why the search stops.
     type Stop;
 
-    /// Which cases no configuration comes to the needle in, which is cheap to find: the most that their margin
-    /// can be, mm; nothing works in them. None of all others.
+    /// Cases that are out of reach of every configuration, which is cheap to find: an upper bound of their margin, mm;
+    /// they are infeasible. None for all others.
     ///
     /// # Errors
-    /// Why it does not go on.
+    /// Why the search stops.
     fn out_of_reach(
         &mut self,
         generation: &Generation,
     ) -> Result<Vec<Vec<Option<f64>>>, Self::Stop>;
 
-    /// What the cases are worth.
+    /// The outcomes of the cases.
     ///
     /// # Errors
-    /// Why it does not go on.
+    /// Why the search stops.
     fn judge(&mut self, generation: &Generation) -> Result<Vec<Vec<CaseWorth>>, Self::Stop>;
 
     /// What a candidate is, by the names of its factors.
@@ -143,7 +145,7 @@ pub trait Judge {
     /// Called after each generation.
     ///
     /// # Errors
-    /// Why it does not go on.
+    /// Why the search stops.
     fn note(&mut self, _log: &SearchLog) -> Result<(), Self::Stop> {
         Ok(())
     }
@@ -152,27 +154,27 @@ pub trait Judge {
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SearchError<S> {
-    /// Too few cases for any.
-    #[error("a budget of {budget} cases is too small: {least} are the least for {what}")]
+    /// The budget is too small.
+    #[error("a budget of {budget} cases is too small: {what} require at least {least}")]
     Budget {
-        /// What was given.
+        /// The given budget.
         budget: u64,
-        /// What is needed.
+        /// The required budget.
         least: u64,
-        /// For what.
+        /// What requires it.
         what: String,
     },
-    /// Too many combinations of finite choices beside ranges.
+    /// Too many combinations of finite control factors with ranges.
     #[error(
-        "{combinations} combinations of finite choices beside ranges; at most {most} are looked at"
+        "{combinations} combinations of finite control factors with ranges; the limit is {most}"
     )]
     Combinations {
         /// How many.
         combinations: usize,
-        /// How many may be.
+        /// The limit.
         most: usize,
     },
-    /// The judge does not go on.
+    /// The evaluator stopped.
     #[error("stopped")]
     Stopped(S),
 }

@@ -1,22 +1,23 @@
-//! What candidates are compared by: figures of the values of their cases.
+//! Objectives that candidates are compared by.
 
-use needlebench_cell::study::search::ObjectiveName;
+use needlebench_numerics::order::quantile_position;
+use needlebench_scenario::study::search::ObjectiveName;
 use serde::{Deserialize, Serialize};
 
 use crate::statistics::{Interval, about_mean, clopper_pearson_with, quantile_ranks};
 
-/// What a case is worth with its best configuration.
+/// The outcome of a case with its best configuration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CaseWorth {
-    /// The most of the configurations' signed margins, mm; negative infinity of a layout that cannot exist.
+    /// The largest constraint margin of the configurations, mm; negative infinity of an invalid layout.
     pub margin_mm: f64,
-    /// Whether any configuration works.
+    /// Whether any configuration is feasible.
     pub works: bool,
-    /// The least expected error of the tip of those that work, mm; none where none does.
+    /// The least RMS tip error of the feasible ones, mm; none where none is.
     pub tip_error_mm: Option<f64>,
 }
 
-/// A figure of a candidate by the values of its cases.
+/// An objective of a candidate, from the outcomes of its cases.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "name")]
 pub enum Objective {
@@ -26,11 +27,11 @@ pub enum Objective {
         /// Share of cases below it.
         quantile: f64,
     },
-    /// The share of cases in which a configuration works: more is better.
+    /// The success rate, the share of cases with a feasible configuration: more is better.
     Rate,
-    /// The mean of the expected error of the tip, mm: less is better.
+    /// The mean RMS tip error, mm: less is better.
     TipError {
-        /// What a case counts in which no configuration works, mm.
+        /// Value of a case without a feasible configuration, mm.
         without_mm: f64,
     },
 }
@@ -44,10 +45,10 @@ pub struct Ends {
     pub high: Option<f64>,
 }
 
-/// A figure with its interval of 95 %.
+/// An estimate with its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// The figure in its unit; none where layouts that cannot exist decide it.
+    /// The estimate in its unit; none where invalid layouts decide it.
     pub value: Option<f64>,
     /// Its interval.
     pub interval: Ends,
@@ -65,14 +66,14 @@ impl Objective {
         }
     }
 
-    /// In words, with what is asked.
+    /// In words, with its parameter.
     pub fn words(self) -> String {
         match self {
-            Self::Margin { quantile } => format!("{:.3} % margin", quantile * 100.0)
-                .replace(".000 %", " %")
-                .replace("00 %", " %"),
-            Self::Rate => "share of layouts that work".to_owned(),
-            Self::TipError { .. } => "mean expected tip error".to_owned(),
+            Self::Margin { quantile } => format!("P{:.3} margin", quantile * 100.0)
+                .replace(".000 ", " ")
+                .replace("00 ", " "),
+            Self::Rate => "success rate".to_owned(),
+            Self::TipError { .. } => "mean RMS tip error".to_owned(),
         }
     }
 
@@ -108,7 +109,7 @@ impl Objective {
     }
 
     /// The most that the score can be of cases of which some are known to be out of reach: those have at most
-    /// such a margin, mm, and nothing works.
+    /// such a margin, mm, and are infeasible.
     pub fn most(self, out_of_reach: &[Option<f64>]) -> f64 {
         let best = |out: &Option<f64>| CaseWorth {
             margin_mm: out.unwrap_or(f64::INFINITY),
@@ -181,24 +182,13 @@ fn mean(values: &[CaseWorth], of: impl Fn(&CaseWorth) -> f64) -> f64 {
 
 /// Quantile of type 7 of ascending values, of which some may be infinite.
 pub(super) fn lower_quantile(sorted: &[f64], p: f64) -> f64 {
-    let (index, share) = place(sorted.len(), p);
+    let (index, share) = quantile_position(sorted.len() as u64, p);
+    let index = usize::try_from(index).expect("an index of a list");
     let low = sorted[index];
     match sorted.get(index + 1) {
         Some(&high) if share > 0.0 && low.is_finite() => low + share * (high - low),
         _ => low,
     }
-}
-
-/// Index of the order statistic at or below the quantile, from 0, and the share of the way to the next.
-pub(super) fn place(count: usize, p: f64) -> (usize, f64) {
-    let at = (count - 1) as f64 * p;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "between 0 and the number of values"
-    )]
-    let index = at.floor() as usize;
-    (index, at - at.floor())
 }
 
 #[cfg(test)]
@@ -259,10 +249,7 @@ mod tests {
 
     #[test]
     fn objectives_are_called_by_what_they_ask() {
-        assert_eq!(Objective::Margin { quantile: 0.05 }.words(), "5 % margin");
-        assert_eq!(
-            Objective::Margin { quantile: 0.025 }.words(),
-            "2.5 % margin"
-        );
+        assert_eq!(Objective::Margin { quantile: 0.05 }.words(), "P5 margin");
+        assert_eq!(Objective::Margin { quantile: 0.025 }.words(), "P2.5 margin");
     }
 }

@@ -1,5 +1,7 @@
 //! Two objectives: the candidates that cannot be improved in one without loss in the other.
 
+use needlebench_numerics::pareto::pareto_front;
+
 use super::finite::{Round, listed, planned};
 use super::log::{Decision, FrontMember};
 use super::pool::{Found, Pool};
@@ -8,9 +10,9 @@ use super::{ALPHA, Choices, Judge, SearchError, SearchPlan};
 
 /// Candidates of the last round, at least.
 const FRONT_FINALISTS: usize = 16;
-/// Members that are judged on fresh circumstances, at most.
+/// Most members that are evaluated on held-out circumstances.
 const JUDGED_ANEW: usize = 8;
-/// Points over ranges, for each combination of finite choices.
+/// Points over ranges, for each combination of finite control factors.
 const POINTS: u32 = 64;
 
 pub(super) fn check<S>(plan: &SearchPlan, choices: &Choices) -> Result<(), SearchError<S>> {
@@ -29,7 +31,7 @@ fn planned_for<S>(plan: &SearchPlan, count: usize) -> Result<Vec<Round>, SearchE
         plan,
         FRONT_FINALISTS,
         reserved,
-        format!("{count} candidates and a front"),
+        format!("{count} candidates and a Pareto front"),
     )
 }
 
@@ -136,11 +138,10 @@ fn by_layers<J: Judge>(pool: &Pool<'_, J>, ids: &[usize], circumstances: u64) ->
     let mut rest: Vec<usize> = (0..ids.len()).collect();
     let mut ordered = Vec::new();
     while !rest.is_empty() {
-        let (layer, later): (Vec<usize>, Vec<usize>) = rest
-            .iter()
-            .partition(|&&i| !rest.iter().any(|&j| dominates(&scores[j], &scores[i])));
+        let front = pareto_front(&rest, |&j, &i| dominates(&scores[j], &scores[i]));
+        let layer: Vec<usize> = front.into_iter().map(|at| rest[at]).collect();
+        rest.retain(|i| !layer.contains(i));
         ordered.extend(by_gaps(layer, &scores).into_iter().map(|i| ids[i]));
-        rest = later;
     }
     ordered
 }

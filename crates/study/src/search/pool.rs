@@ -1,4 +1,4 @@
-//! All candidates of a search with what is known of them, and what was asked for it.
+//! All candidates of a search with their outcomes, and the requests for them.
 
 use super::log::{
     Answer, CandidateLog, CandidateStanding, Decision, GenerationLog, Purpose, SearchLog,
@@ -24,9 +24,9 @@ struct Entry {
 pub(super) struct Found {
     /// Those with all circumstances, the best first.
     pub ranked: Vec<usize>,
-    /// Of those who cannot be told from the first.
+    /// Those not significantly different from the first.
     pub equals: Vec<usize>,
-    /// Dropped by order alone.
+    /// Eliminated by order alone.
     pub undecided: Vec<usize>,
 }
 
@@ -75,13 +75,13 @@ impl<'a, J: Judge> Pool<'a, J> {
         })
     }
 
-    /// Cases that count against the budget: those that reach ruled out too, so that what it rules out changes
-    /// nothing else.
+    /// Cases that count against the budget, including those eliminated by reachability, so that this elimination
+    /// changes nothing else.
     pub fn charged(&self) -> u64 {
         self.entries.iter().map(|each| each.charged).sum()
     }
 
-    /// Common circumstances that a candidate was judged under.
+    /// Number of common circumstances that a candidate was evaluated under.
     pub fn known(&self, id: usize) -> u64 {
         self.entries[id].worth.len() as u64
     }
@@ -120,7 +120,7 @@ impl<'a, J: Judge> Pool<'a, J> {
         keyed.into_iter().map(|(id, _)| id).collect()
     }
 
-    /// Asks for what is missing of some candidates up to a number of circumstances.
+    /// Requests the missing cases of some candidates up to a number of circumstances.
     pub fn evaluate(
         &mut self,
         ids: &[usize],
@@ -237,10 +237,10 @@ impl<'a, J: Judge> Pool<'a, J> {
             .collect();
     }
 
-    /// The best `keep` of some candidates, the best first, and who could not be among them by reach alone.
+    /// The best `keep` of some candidates, the best first, and those eliminated by reachability alone.
     ///
-    /// Those out of reach in so many cases that their score is bounded wait until the others are judged. If
-    /// `keep` of those are better than the bound, they are never judged: the answer is the same as without.
+    /// Those out of reach in so many cases that their score is bounded wait until the others are evaluated. If `keep`
+    /// of those are better than the bound, they are never evaluated: the answer is the same.
     pub fn best(
         &mut self,
         ids: &[usize],
@@ -307,8 +307,8 @@ impl<'a, J: Judge> Pool<'a, J> {
         Ok(())
     }
 
-    /// Which of some candidates, the best first, cannot be told from the best of them; shorter than they are where they are too many to
-    /// be compared.
+    /// Which of some candidates, the best first, are not significantly different from the best of them; shorter where
+    /// they are too many to be compared.
     pub fn equals(&self, ranked: &[usize], circumstances: u64, alpha: f64) -> Vec<bool> {
         let raced = &ranked[..ranked.len().min(MOST_RACED)];
         let worth = raced.iter().map(|&id| self.worth(id, circumstances));
@@ -316,7 +316,7 @@ impl<'a, J: Judge> Pool<'a, J> {
         Race::new(self.plan.objective, worth.collect(), seed).equals(alpha)
     }
 
-    /// Which is better for certain, by objective, then pair.
+    /// Which is significantly better, by objective, then pair.
     pub fn told_apart(&self, ids: &[usize], circumstances: u64, alpha: f64) -> Vec<Vec<Vec<bool>>> {
         let objectives = self.log.objectives.iter();
         objectives
@@ -330,7 +330,7 @@ impl<'a, J: Judge> Pool<'a, J> {
             .collect()
     }
 
-    /// Figures of a candidate on fresh circumstances.
+    /// Estimates of a candidate on held-out circumstances.
     pub fn fresh(&self, id: usize) -> Vec<Estimate> {
         let objectives = self.log.objectives.iter();
         let worth = &self.entries[id].fresh;
@@ -346,7 +346,7 @@ impl<'a, J: Judge> Pool<'a, J> {
         });
     }
 
-    /// Judges candidates on circumstances that nothing was compared by.
+    /// Evaluates candidates on held-out circumstances.
     pub fn judge_anew(&mut self, ids: &[usize]) -> Result<(), SearchError<J::Stop>> {
         let fresh = self.plan.fresh;
         let generation = self.generation(Purpose::Fresh, Stream::Fresh, ids, 0, fresh);
@@ -385,9 +385,9 @@ impl<'a, J: Judge> Pool<'a, J> {
 
 /// Those that are kept, and those that cannot be.
 pub(super) struct Best {
-    /// All that were judged, the best first.
+    /// All evaluated ones, the best first.
     pub ranked: Vec<usize>,
-    /// Never judged.
+    /// Never evaluated.
     pub ruled_out: Vec<usize>,
 }
 

@@ -1,29 +1,30 @@
-//! Which candidates cannot be told from the best.
+//! Multiple comparisons with the best: which candidates are not significantly different from it.
 
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::order::quantile_position;
+use needlebench_numerics::random::SplitMix64;
 
-use super::objective::{CaseWorth, Objective, place};
+use super::objective::{CaseWorth, Objective};
 
 /// Resamples of the bootstrap.
 const RESAMPLES: usize = 1000;
 
-/// Fewer cases tell nothing apart: resamples of so few have too few values.
+/// Fewer cases give no significant differences: resamples of so few have too few values.
 const FEWEST_CASES: usize = 16;
 
-/// What a margin counts at least, mm: a layout that cannot exist has none, and differences of infinities
-/// are none.
+/// Lower limit of a margin, mm: that of an invalid layout is minus infinity, and differences of infinities are
+/// undefined.
 const LEAST_MARGIN_MM: f64 = -1e4;
 
 /// All pairs of candidates are compared at once, by a paired bootstrap.
 ///
-/// Candidates have the same cases, so that what a case does to all of them drops out of their differences:
-/// cases are drawn with replacement, the same ones for all candidates, and differences of scores are held
-/// against how much they vary so, each in units of its own deviation. The largest deviation of any pair is the yardstick:
-/// with a chance of at most `alpha` any true difference is beyond it. That is Hsu's comparison with the best
-/// (The Annals of Statistics 9 (1981) 1026) with the yardstick of all pairs, so that it does not matter that the best was
-/// found with the same cases. Who is beyond it is out, and the rest is compared again, as in the model
-/// confidence set of Hansen, Lunde and Nason (Econometrica 79 (2011) 453). Bonferroni's correction would hold as well but
-/// knows nothing of how alike candidates are: neighbouring places of a robot have nearly the same cases.
+/// Candidates have the same cases, so that common effects of a case cancel in their differences: cases are resampled
+/// with replacement, the same ones for all candidates, and differences of scores are compared with their bootstrap
+/// variation, each in units of its own standard deviation. The critical value is that of the largest deviation of any
+/// pair: it is exceeded with a probability of at most `alpha` (family-wise). That is Hsu's comparison with the best
+/// (The Annals of Statistics 9 (1981) 1026) with the critical value of all pairs, so that it does not matter that the
+/// best was found with the same cases. Candidates beyond it are eliminated, and the rest is compared again, as in the
+/// model confidence set of Hansen, Lunde and Nason (Econometrica 79 (2011) 453). Bonferroni's correction would be valid
+/// too, but ignores the correlation of candidates: neighbouring base placements have nearly the same outcomes.
 ///
 /// Asymptotic in the number of cases, and tested: over 300 synthetic sets the best is in it in 95 %.
 pub(crate) struct Race<'a> {
@@ -104,7 +105,7 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// Whether `a` is better than `b` for certain, at a yardstick.
+    /// Whether `a` is significantly better than `b`, at a critical value.
     fn is_better(&self, a: usize, b: usize, yardstick: f64) -> bool {
         if self.resampled.is_empty() {
             return false;
@@ -127,8 +128,8 @@ impl<'a> Race<'a> {
         pairs.map(|(a, b)| a - b)
     }
 
-    /// What the largest deviation of any pair of some candidates exceeds with a chance of `alpha`, in units of
-    /// its own.
+    /// The value that the largest deviation of any pair of some candidates exceeds with a probability of `alpha`, in
+    /// units of its own standard deviation.
     fn yardstick(&self, among: &[usize], alpha: f64) -> f64 {
         if self.resampled.is_empty() {
             return f64::INFINITY;
@@ -150,7 +151,7 @@ impl<'a> Race<'a> {
         super::objective::lower_quantile(&largest, 1.0 - alpha)
     }
 
-    /// Whether each candidate cannot be told from the best, but for a chance of `alpha`.
+    /// Whether each candidate is not significantly different from the best, family-wise error rate `alpha`.
     pub(crate) fn equals(&self, alpha: f64) -> Vec<bool> {
         let mut among: Vec<usize> = (0..self.values.len()).collect();
         loop {
@@ -181,7 +182,7 @@ impl<'a> Race<'a> {
         equals
     }
 
-    /// For each pair whether the first is better for certain, by the yardstick of all pairs.
+    /// For each pair whether the first is significantly better, by the critical value of all pairs.
     pub(super) fn told_apart(&self, alpha: f64) -> Vec<Vec<bool>> {
         let all: Vec<usize> = (0..self.values.len()).collect();
         let yardstick = self.yardstick(&all, alpha);
@@ -196,11 +197,11 @@ impl<'a> Race<'a> {
 }
 
 fn counted_quantile(values: &[CaseWorth], order: &[u32], counts: &[u32], p: f64) -> f64 {
-    let (index, share) = place(values.len(), p);
+    let (index, share) = quantile_position(values.len() as u64, p);
     let mut passed = 0;
     let mut low = None;
     for &at in order {
-        let count = counts[at as usize] as usize;
+        let count = u64::from(counts[at as usize]);
         if count == 0 {
             continue;
         }

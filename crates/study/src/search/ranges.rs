@@ -1,13 +1,13 @@
-//! Choices with ranges: a first look, evolution strategies, and a race of the best.
+//! Control factors with ranges: screening, evolution strategies, and a race of the best.
 
 use super::finite::{Round, race};
 use super::log::{Decision, Purpose};
 use super::pool::{Found, Pool};
 use super::{Choices, CmaEs, FINALISTS, Judge, SearchError, SearchPlan};
-use crate::sobol::SobolDimension;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
+use needlebench_numerics::sobol::SobolDimension;
 
-/// Combinations of finite choices that have an evolution strategy each, at most.
+/// Most combinations of finite control factors that have an evolution strategy each.
 const MOST_COMBINATIONS: usize = 16;
 /// Points of the first look, of all combinations together, and of each at least.
 const SCREENED: usize = 32;
@@ -20,10 +20,10 @@ const ARRIVED: f64 = 0.004;
 const ELSEWHERE: f64 = 0.2;
 /// Candidates nearer to each other are one in the race.
 const DISTINCT: f64 = 0.02;
-/// Generations of each strategy that a budget has to have room for.
+/// Generations of each strategy that a budget must allow.
 const LEAST_GENERATIONS: u64 = 4;
 
-/// One combination of the finite choices.
+/// One combination of the finite control factors.
 struct Island {
     combination: usize,
     /// Points of the first look, the best first.
@@ -34,7 +34,7 @@ struct Island {
     points: Vec<(usize, Vec<f64>)>,
 }
 
-/// Circumstances of a first look, of an evolution, and of the last round.
+/// Circumstances of screening, of evolution, and of the last round.
 fn circumstances(samples: u64) -> [u64; 3] {
     let evolution = (samples / 4)
         .next_power_of_two()
@@ -57,7 +57,9 @@ pub(super) fn check<S>(plan: &SearchPlan, choices: &Choices) -> Result<(), Searc
         return Err(SearchError::Budget {
             budget: plan.budget,
             least: needed,
-            what: format!("{combinations} combinations of finite choices with {dimensions} ranges"),
+            what: format!(
+                "{combinations} combinations of finite control factors with {dimensions} ranges"
+            ),
         });
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! The candidates and circumstances of a study.
 
-use needlebench_cell::study::{
+use needlebench_numerics::sobol::DIMENSIONS;
+use needlebench_scenario::study::{
     Distribution, FactorValues, ResolvedStudy, Role, SamplingMethod, StudyFactor,
 };
 
@@ -8,32 +9,29 @@ use super::{Candidate, ChoiceAxis, Choices, Generation, Stream};
 use crate::design::{described, goal_factor};
 use crate::distribution::quantile;
 use crate::sampling::{Dimension, most_dimensions};
-use crate::sobol::DIMENSIONS;
 use crate::store::CaseDesign;
 use crate::{Factor, FactorKind, FactorValue};
 
-/// Makes the points that nothing is compared by other than those that candidates are compared by.
+/// Makes the held-out points different from those that candidates are compared by.
 const FRESH: u64 = 0x2545_f491_4f6c_dd1d;
 
-/// Why a study has nothing to search.
+/// Why a study cannot be searched.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SpaceError {
-    /// Nothing to choose.
-    #[error("no factor has `role = \"choice\"`: there is nothing to choose")]
+    /// No control factor.
+    #[error("no control factor: no factor has `role = \"choice\"`")]
     NoChoice,
-    /// Nothing that a choice is to hold for.
-    #[error(
-        "all factors are choices, and there is one goal: there is nothing that a choice is to hold for"
-    )]
+    /// No noise factor.
+    #[error("no noise factor: all factors are control factors, and there is one goal")]
     NoCircumstance,
-    /// A choice from a distribution.
-    #[error("the choice `{factor}` has `normal`, but what is ours to choose is not drawn")]
+    /// A control factor with a distribution.
+    #[error("the control factor `{factor}` has `normal`, but control factors are not sampled")]
     Drawn {
         /// Its name.
         factor: String,
     },
-    /// More circumstances than the sampling has dimensions.
-    #[error("{circumstances} circumstances are sampled, but {method} has {most} dimensions")]
+    /// More noise factors than the sampling has dimensions.
+    #[error("{circumstances} noise factors are sampled, but {method} has {most} dimensions")]
     TooManyDimensions {
         /// How many vary, goals included.
         circumstances: usize,
@@ -43,7 +41,7 @@ pub enum SpaceError {
         most: usize,
     },
     /// More ranges than points can be spread over.
-    #[error("{ranges} choices have ranges, but points are spread over {most} at most")]
+    #[error("{ranges} control factors have ranges; the limit is {most}")]
     TooManyRanges {
         /// How many have one.
         ranges: usize,
@@ -69,8 +67,8 @@ enum Part {
     },
 }
 
-/// Candidates and circumstances of a study. Circumstances are points of the cube of all factors that are not ours to
-/// choose, goals and crossed levels included, all levels equally likely: so a few of them are a sample of all.
+/// Candidates and circumstances of a study. Circumstances are points of the cube of all noise factors, goals and
+/// crossed levels included, all levels equally likely: so a few of them are a sample of all.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchSpace {
     factors: Vec<Factor>,
@@ -253,7 +251,7 @@ impl SearchSpace {
             .collect()
     }
 
-    /// Choices by the names of their factors: labels of levels, numbers.
+    /// Values of the control factors by name: labels of levels, numbers.
     pub fn describe(&self, candidate: &[FactorValue]) -> Vec<(String, serde_json::Value)> {
         let chosen = self.factors.iter().filter(|each| each.role == Role::Choice);
         chosen

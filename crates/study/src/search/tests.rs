@@ -1,7 +1,7 @@
 //! Searches of which the truth is known.
 
-use needlebench_kinematics::normal;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::normal;
+use needlebench_numerics::random::SplitMix64;
 use serde_json::Value;
 
 use super::*;

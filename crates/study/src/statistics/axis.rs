@@ -24,7 +24,7 @@ pub struct Axis {
     pub name: String,
     /// Unit of the factor.
     pub unit: String,
-    /// Whether it is ours to choose.
+    /// Control or noise factor.
     pub role: Role,
     /// Whether a bin holds several levels or a part of a continuum.
     pub coarse: bool,
@@ -105,7 +105,7 @@ impl Axis {
         self.bins.is_empty()
     }
 
-    /// Combinations of the crossed factors that it tells apart.
+    /// Combinations of the crossed factors that it distinguishes.
     pub(crate) fn crossed(&self) -> u64 {
         self.levels.max(1) as u64
     }

@@ -1,4 +1,4 @@
-//! Which choice is the best: where the robot should stand, which tool it should have.
+//! Ranking of candidates, such as base placements or tools.
 
 use std::rc::Rc;
 
@@ -13,47 +13,45 @@ use super::selection::Quantiles;
 use super::spread::QuantileValue;
 use crate::{CaseResult, Factor, FactorKind, FactorValue, Role};
 
-/// Combinations of sampled choices, in bins, that are ranked at most.
+/// Most candidates of sampled control factors, in bins, that are ranked.
 const MOST_BINNED: usize = 256;
 
-/// Combinations of levels that are ranked at most.
+/// Most candidates of levels that are ranked.
 const MOST_CHOICES: usize = 1024;
 
-/// Bins of a sampled choice, where there are few others.
+/// Bins of a sampled control factor, where there are few others.
 const MOST_BINS: usize = 12;
 
-/// Fewest layouts that two choices have to differ by: even if all of them went one way, an exact
-/// McNemar test of fewer stays above 5 %.
+/// Fewest layouts that two candidates must differ by: even if all of them favour one, an exact McNemar test of fewer
+/// stays above 5 %.
 const FEWEST_DIFFERENT: u64 = 6;
 
 /// Share of the quantile of the best clearance.
 const CLEARANCE_P: f64 = 0.05;
 
-/// Choices, best first.
+/// Candidates, best first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChoiceRanking {
-    /// The factors that are ours to choose and take more than one value.
+    /// The control factors that take more than one value.
     pub axes: Vec<Axis>,
-    /// Configurations that have to be ok, of [`Choice::works_k`].
+    /// Required feasible configurations, of [`Choice::works_k`].
     pub working_configurations: usize,
-    /// By what they are ranked, in words.
+    /// The ranking criterion, in words.
     pub ranked_by: String,
-    /// Share of the valid layouts that work with a choice that was picked on one half of the points, on
-    /// the other half: what picking the best of so many makes of its share is not in it. None where there
-    /// are too few points.
+    /// Split-half success rate: of a candidate selected on one half of the points, evaluated on the other half, free of
+    /// selection bias. None where there are too few points.
     pub held_out: Option<f64>,
-    /// Whether all choices met the same circumstances.
+    /// Whether all candidates were evaluated on the same points of the noise factors.
     pub paired: bool,
-    /// Whether the choices differ in which layouts can exist at all, so that their rates are not of
-    /// the same layouts.
+    /// Whether the candidates differ in which layouts are valid, so that their rates are not of the same layouts.
     pub validity_differs: bool,
-    /// By the share of their cases that work, those that cannot exist included, then by the 5 % quantile of
-    /// the best clearance, then by the median tip error.
+    /// By the share of feasible cases (invalid ones count as infeasible), then by P5 of the best clearance, then by the
+    /// median tip error.
     pub choices: Vec<Choice>,
 }
 
 impl ChoiceRanking {
-    /// Whether a case is one of the best choice.
+    /// Whether a case is one of the best candidate.
     pub fn is_best(&self, values: &[FactorValue]) -> bool {
         self.choices.first().is_some_and(|best| {
             let mut bins = self.axes.iter().zip(&best.bins);
@@ -62,7 +60,7 @@ impl ChoiceRanking {
     }
 }
 
-/// One combination of what is ours to choose.
+/// One candidate: a combination of the control factors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Choice {
     /// Bin of each axis.
@@ -71,37 +69,37 @@ pub struct Choice {
     pub label: String,
     /// Cases.
     pub cases: u64,
-    /// Cases whose layout cannot exist.
+    /// Cases with an invalid layout.
     pub invalid: u64,
     /// Share of the valid layouts in which at least one configuration is ok.
     pub works: Rate,
     /// Share of the valid layouts in which at least [`ChoiceRanking::working_configurations`] are.
     pub works_k: Rate,
-    /// 5 % quantile of the clearance of the best configuration, mm, over the layouts that have one.
+    /// P5 clearance of the best configuration, mm, over the layouts that have one.
     pub best_clearance_mm: Option<QuantileValue>,
     /// Median tip error of the best configuration, mm.
     pub tip_error_mm: Option<QuantileValue>,
-    /// How much less often it works than the first; none of the first.
+    /// Difference of its success rate to the first; none of the first.
     pub against_first: Option<Difference>,
     /// First valid cases in which no configuration is ok.
     pub failing: Vec<u64>,
 }
 
-/// Difference of two shares over the same circumstances, where they are the same.
+/// Difference of two success rates, paired where they are of the same points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Difference {
-    /// Share of the first less the share of this.
+    /// Rate of the first minus the rate of this one.
     pub difference: f64,
     /// Its interval; none where all layouts come from one sampled point.
     pub interval: Option<Interval>,
-    /// Whether the interval leaves 0 out and at least 6 layouts differ.
+    /// Whether the difference is significant: its interval excludes 0 and at least 6 layouts differ.
     pub distinguishable: bool,
 }
 
 struct Counter {
     cases: u64,
     invalid: u64,
-    /// Whether it works, case by case: what cannot exist with a choice does not work with it.
+    /// Feasibility, case by case: invalid layouts count as infeasible.
     serves: Grouped,
     works: Grouped,
     works_k: Grouped,
@@ -110,15 +108,15 @@ struct Counter {
     clearance: Quantiles,
     tip_error: Quantiles,
     failing: Vec<u64>,
-    /// Sum of what identifies the circumstances, whatever their order.
+    /// Sum that identifies the points of the noise factors, whatever their order.
     circumstances: u64,
 }
 
-/// Counts over the choices.
+/// Counts over the candidates.
 pub(crate) struct ChoiceCounter {
     axes: Vec<Axis>,
     k: usize,
-    /// Configurations that have to be ok for a layout to count as one that works.
+    /// Required feasible configurations for a layout to count as feasible.
     ranked_k: usize,
     repeats: u64,
     cells: Vec<Counter>,
@@ -126,7 +124,7 @@ pub(crate) struct ChoiceCounter {
 }
 
 impl ChoiceCounter {
-    /// None where nothing is ours to choose; an error in words where there is too much.
+    /// None without control factors; an error in words where there are too many candidates.
     pub(crate) fn new(
         factors: &[Factor],
         k: usize,
@@ -163,7 +161,7 @@ impl ChoiceCounter {
         let size = cells(bins);
         if size > MOST_CHOICES as u64 {
             return Some(Err(format!(
-                "{size} combinations of what is to be chosen are more than {MOST_CHOICES}: not ranked"
+                "{size} candidates exceed the limit of {MOST_CHOICES}: not ranked"
             )));
         }
         let axes: Vec<Axis> = chosen
@@ -199,7 +197,7 @@ impl ChoiceCounter {
         }))
     }
 
-    /// Index of the choice of a case.
+    /// Index of the candidate of a case.
     pub(crate) fn cell(&self, values: &[FactorValue]) -> usize {
         self.axes.iter().fold(0, |index, axis| {
             index * axis.len() + axis.bin(values[axis.factor])
@@ -266,7 +264,7 @@ impl ChoiceCounter {
             let unit = if axis.unit.is_empty() { "" } else { " " };
             // A name needs no factor before it, a number does.
             if axis.bins[bin].low.is_some() {
-                format!("{} {label}{unit}{}", axis.name, axis.unit)
+                format!("{} = {label}{unit}{}", axis.name, axis.unit)
             } else {
                 label.clone()
             }
@@ -320,14 +318,13 @@ impl ChoiceCounter {
         })
     }
 
-    /// Share of the cases of a choice that work.
+    /// Share of the feasible cases of a candidate.
     fn share(&self, index: usize) -> f64 {
         let serves = &self.cells[index].serves;
         serves.total() / serves.count().max(1.0)
     }
 
-    /// What a choice is worth that was picked on one half of the points, on the other half, and the other
-    /// way round.
+    /// Split-half success rate: selected on one half of the points, evaluated on the other, and vice versa.
     fn held_out(&self) -> Option<f64> {
         let (mut working, mut of) = (0.0, 0.0);
         for half in 0..2 {
@@ -352,7 +349,7 @@ impl ChoiceCounter {
         (of > 0.0).then(|| working / of)
     }
 
-    /// The ranking, and the index of its first choice.
+    /// The ranking, and the index of its first candidate.
     pub(crate) fn finish(&self) -> (ChoiceRanking, Option<usize>) {
         let used = (0..self.cells.len()).filter(|&index| self.cells[index].cases > 0);
         let mut choices: Vec<(usize, Choice)> =
@@ -382,15 +379,15 @@ impl ChoiceCounter {
             .iter()
             .any(|(_, choice)| invalid(choice) != invalid(&choices[0].1));
         let works = match self.ranked_k {
-            1 => "at least one configuration is".to_owned(),
-            k => format!("at least {k} configurations are"),
+            1 => "one feasible configuration".to_owned(),
+            k => format!("{k} feasible configurations"),
         };
         let ranking = ChoiceRanking {
             axes: self.axes.clone(),
             working_configurations: self.k,
             ranked_by: format!(
-                "the share of its cases in which {works} ok, layouts that cannot exist counting against \
-                 it; of equal ones the 5 % quantile of the best clearance, then the median tip error"
+                "the share of cases with at least {works} (invalid layouts count as infeasible); ties by P5 of the best \
+                 clearance, then by the median tip error"
             ),
             held_out: self.held_out(),
             paired,
@@ -400,7 +397,7 @@ impl ChoiceCounter {
         (ranking, first)
     }
 
-    /// Cases of a choice, with the points that they repeat.
+    /// Cases of a candidate, with the points that they repeat.
     pub(crate) fn cases(&self, index: usize) -> u64 {
         self.cells[index].cases
     }

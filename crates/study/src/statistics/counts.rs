@@ -10,30 +10,31 @@ use super::layout::{CONFIGURATIONS, Layout};
 use super::moments::Grouped;
 use crate::{CaseResult, Outcome};
 
-/// Details that are told apart for each configuration and outcome; the rest count as `other`.
+/// Most details that are counted separately for each configuration and outcome; the rest count as `other`.
 const MOST_DETAILS: usize = 100;
 
-/// What became of cases and configurations: of all, or of one goal.
+/// Outcomes of cases and configurations: of all, or of one goal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Counts {
     /// The goal; none of all.
     pub goal: Option<String>,
     /// Cases.
     pub cases: u64,
-    /// Cases whose layout cannot exist. They are in none of the rates.
+    /// Cases with an invalid layout, excluded from all rates.
     pub invalid: u64,
-    /// Why they cannot, by the key that is at fault; the most frequent first.
+    /// Why they are invalid, by the key at fault; the most frequent first.
     pub invalid_details: Vec<DetailCount>,
     /// Valid layouts: cases that are not invalid.
     pub layouts: u64,
-    /// Share of the valid layouts in which at least 1, 2, ... 8 configurations are ok. What was not judged counts as not
+    /// Share of the valid layouts in which at least 1, 2, ... 8 configurations are ok. Those not evaluated count as not
     /// ok.
     pub at_least: Vec<Rate>,
-    /// Layouts in which it is not known whether at least 1, 2, ... 8 configurations are ok, because some were not judged.
+    /// Layouts in which it is not known whether at least 1, 2, ... 8 configurations are ok, because some were not
+    /// evaluated.
     #[serde(default)]
     pub undecided: Vec<u64>,
-    /// The same of the layouts whose needle keeps away from bone, vessels and organs; none unless the study leaves that
-    /// out of what works.
+    /// The same including the needle path's clearance from bone, vessels and organs; none unless feasibility leaves it
+    /// out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub with_route: Option<WithRoute>,
     /// Valid layouts in which exactly 0, 1, ... 8 configurations are ok.
@@ -42,14 +43,14 @@ pub struct Counts {
     pub configurations: Vec<ConfigurationCounts>,
 }
 
-/// Rates that count what works by the needle's route too.
+/// Rates that include the needle path.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WithRoute {
-    /// How far the needle is to keep away, mm.
+    /// Required clearance, mm.
     pub least_mm: f64,
-    /// Valid layouts of which the needle's distance is known.
+    /// Valid layouts with a known needle-path clearance.
     pub known: u64,
-    /// Those of them in which it keeps away.
+    /// Those of them with the required clearance.
     pub kept: u64,
     /// Share of the known ones in which it does and at least 1, 2, ... 8 configurations are ok.
     pub at_least: Vec<Rate>,
@@ -57,25 +58,25 @@ pub struct WithRoute {
     pub configurations: Vec<Rate>,
 }
 
-/// What became of a configuration.
+/// Outcomes of a configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ConfigurationCounts {
     /// Its label.
     pub label: String,
     /// Layouts in which it is ok.
     pub ok: u64,
-    /// Layouts in which it misses a criterion.
+    /// Layouts in which it fails a criterion.
     pub failed: u64,
     /// Layouts in which a rule rejects it.
     pub rejected: u64,
-    /// Layouts in which it was not judged.
+    /// Layouts in which it was not evaluated.
     #[serde(default)]
     pub not_judged: u64,
     /// Layouts in which it is the best: ok, with the largest clearance of those that are.
     pub best: u64,
     /// Share of the valid layouts in which it is ok.
     pub success: Rate,
-    /// What failed and rejected it, and what was not judged, the most frequent first.
+    /// Reasons for failure and rejection, and for no evaluation, the most frequent first.
     pub details: Vec<DetailCount>,
 }
 
@@ -91,7 +92,7 @@ pub struct DetailCount {
 }
 
 impl Counts {
-    /// How many motions were not judged, by what could not be: `engine_failure rapier`, or a criterion.
+    /// How many motions were not evaluated, by reason: `engine_failure rapier`, or a criterion.
     pub fn not_judged(&self) -> BTreeMap<&str, u64> {
         let mut counts = BTreeMap::new();
         let details = self.configurations.iter().flat_map(|each| &each.details);
@@ -120,7 +121,7 @@ pub(crate) struct Counter {
     route: RouteCounter,
 }
 
-/// Counters of layouts whose needle keeps away.
+/// Counters of layouts with the required needle-path clearance.
 #[derive(Debug, Clone, Default)]
 struct RouteCounter {
     known: u64,
@@ -248,8 +249,8 @@ impl Counter {
             .fold(1.0, f64::max)
     }
 
-    /// The numbers of a goal, or of all; `repeats` cases come from each sampled point, and the truth is
-    /// beyond an end of an interval with the chance `tail`.
+    /// The numbers of a goal, or of all; `repeats` cases come from each sampled point, and the true value is beyond
+    /// an end of an interval with probability `tail`.
     pub(crate) fn finish(
         &self,
         goal: Option<String>,

@@ -1,6 +1,6 @@
-//! How often intervals of rates hold the truth, where cases of a point share its fate.
+//! Coverage of the confidence intervals of rates, where cases of a point are correlated.
 
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 
 use super::interval::{CONFIDENCE, Rate, TAIL};
 use super::moments::{GROUPS, Grouped};
@@ -11,7 +11,7 @@ enum Alike {
     /// Each case has its point's fate with this probability, and otherwise its own: the correlation of two
     /// cases of a point is the square.
     Often(f64),
-    /// Half of a point's cases share its fate, the others always work: one lesion that cannot be reached
+    /// Half of a point's cases share its outcome, the others are always feasible: one lesion that cannot be reached
     /// from everywhere among others that can.
     Half,
 }
@@ -45,7 +45,7 @@ fn sampled(random: &mut SplitMix64, points: u64, repeats: u64, truth: f64, alike
     Rate::new(successes, points * repeats, size)
 }
 
-/// Share of the samples whose interval holds the truth.
+/// Share of the samples whose interval contains the true value.
 fn coverage(samples: u32, points: u64, repeats: u64, truth: f64, alike: Alike) -> f64 {
     let mut random = SplitMix64::new(points ^ repeats << 16);
     let covered = (0..samples).filter(|_| {

@@ -12,7 +12,7 @@ use crate::FactorValue;
 /// Responses: four of the layout, then the success of each configuration.
 const RESPONSES: usize = 4 + CONFIGURATIONS;
 
-/// What the factors do to the responses.
+/// Effects of the factors on the responses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Effects {
     /// The factors that take more than one value, cut into bins.
@@ -21,7 +21,7 @@ pub struct Effects {
     pub responses: Vec<ResponseEffects>,
 }
 
-/// What the factors do to a response.
+/// Effects of the factors on a response.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ResponseEffects {
     /// `any_works` (1 where at least one configuration is ok, else 0), `working` (how many are),
@@ -33,13 +33,13 @@ pub struct ResponseEffects {
     pub mean: Option<f64>,
     /// Standard deviation over them.
     pub standard_deviation: Option<f64>,
-    /// What each factor does alone, in the order of [`Effects::axes`].
+    /// Main effects, in the order of [`Effects::axes`].
     pub main: Vec<MainEffect>,
-    /// What pairs do beyond that; the largest first.
+    /// Interactions; the largest first.
     pub interactions: Vec<Interaction>,
 }
 
-/// What a factor does to a response, alone.
+/// The main effect of a factor on a response.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MainEffect {
     /// Index of the axis.
@@ -47,7 +47,7 @@ pub struct MainEffect {
     /// Share of the response's variance that the means of the bins explain, without what chance
     /// explains: epsilon squared. About 0 or below where it explains nothing.
     pub share: Option<f64>,
-    /// Largest share that chance alone makes in 19 of 20 cases.
+    /// Largest share that is not significant at the 5 % level.
     pub noise: Option<f64>,
     /// Mean in each bin.
     pub bins: Vec<BinMean>,
@@ -66,14 +66,14 @@ pub struct BinMean {
     pub small: bool,
 }
 
-/// What two factors do together beyond what each does alone.
+/// The interaction of two factors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interaction {
     /// Indices of the axes.
     pub axes: [usize; 2],
     /// Share of the response's variance, without what chance explains.
     pub share: f64,
-    /// Largest share that chance alone makes in 19 of 20 cases.
+    /// Largest share that is not significant at the 5 % level.
     pub noise: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Numbers of cases that are worth a look: each can be rerun alone.
+//! Numbers of cases to inspect: each can be rerun alone.
 
 use needlebench_kinematics::ik::Configuration;
 use serde::{Deserialize, Serialize};
@@ -11,10 +11,10 @@ use crate::{CaseResult, MetricColumn};
 /// Cases that each list has at most.
 pub const MOST_CASES: usize = 5;
 
-/// Cases that show what goes wrong.
+/// Cases that show failures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
-    /// First cases whose layout cannot exist.
+    /// First cases with an invalid layout.
     pub invalid: Vec<u64>,
     /// First cases in which fewer than 1, 2, ... 8 configurations are ok.
     pub fewer_than: Vec<Vec<u64>>,
@@ -22,7 +22,7 @@ pub struct Evidence {
     pub configurations: Vec<ConfigurationEvidence>,
 }
 
-/// Cases that show what goes wrong with a configuration.
+/// Cases that show failures of a configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ConfigurationEvidence {
     /// Label of the configuration, or [`BEST`].

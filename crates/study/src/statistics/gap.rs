@@ -1,4 +1,4 @@
-//! How much a study of postures alone overstates: the same cases with their motions planned.
+//! Overestimate of a study of postures only: the same cases with their motions planned.
 
 use needlebench_kinematics::ik::Configuration;
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ pub struct ReplannedCase {
     pub planned: u8,
 }
 
-/// Share of cases that work by their postures, less the share that does with its motions.
+/// Share of cases that are feasible as postures, minus the share that is feasible with motions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Gap {
     /// Label of the configuration, or [`ANY`].
@@ -31,9 +31,9 @@ pub struct Gap {
     pub by_postures: u64,
     /// Cases in which it is ok with its motion.
     pub planned: u64,
-    /// Cases that work by their posture alone and not with a motion.
+    /// Cases feasible as postures, but not with a motion.
     pub lost: u64,
-    /// Cases that work with a motion only: a plan may end in another posture.
+    /// Cases feasible with a motion only: a plan may end in another posture.
     pub gained: u64,
     /// Difference of the shares; none of no cases.
     pub gap: Option<f64>,
@@ -45,7 +45,7 @@ pub struct Gap {
 ///
 /// The difference is the share of lost cases less the share of gained ones. Each of these two has Clopper
 /// and Pearson's interval of 97.5 %, so that both hold together with at least 95 % (Bonferroni), and the
-/// difference then lies between their differences. The cases are drawn at random from those of the study,
+/// difference then lies between their differences. The cases are sampled at random from those of the study,
 /// each as likely as any other, so they are independent whatever repeats in the design.
 pub fn gaps(cases: &[ReplannedCase]) -> Vec<Gap> {
     let labels = Configuration::ALL.iter().map(|each| each.label());
@@ -88,7 +88,7 @@ fn gap(of: &str, mask: u8, cases: &[ReplannedCase]) -> Gap {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     use super::*;
 

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::beta::beta_quantile;
+use needlebench_numerics::{beta, student};
 
 /// Confidence of every interval.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// Chance that the truth is beyond one end of an interval.
+/// Probability that the true value is beyond one end of an interval.
 pub(crate) const TAIL: f64 = 0.5 * (1.0 - CONFIDENCE);
 
 /// Below this many layouts a rate is called a small sample.
@@ -43,20 +43,20 @@ pub struct Rate {
     pub rate: Option<f64>,
     /// Clopper and Pearson's interval of the share, of [`Rate::effective_size`] trials.
     pub interval: Option<Interval>,
-    /// Independent layouts that tell as much: less than `of` where the same sampled points appear
-    /// in several layouts.
+    /// Effective sample size: less than `of` where the same sampled points appear in several
+    /// layouts.
     pub effective_size: f64,
-    /// What to keep in mind, in words; none for a sample that is large enough.
+    /// A remark, in words; none for a sample that is large enough.
     pub remark: Option<String>,
 }
 
 impl Rate {
-    /// A rate of layouts that tell as much as `effective_size` independent ones.
+    /// A rate with an effective sample size.
     pub fn new(successes: u64, of: u64, effective_size: f64) -> Self {
         Self::with_tail(successes, of, effective_size, TAIL)
     }
 
-    /// The same with another chance that the truth is beyond each end of the interval.
+    /// The same with another probability that the true value is beyond each end of the interval.
     pub(crate) fn with_tail(successes: u64, of: u64, effective_size: f64, tail: f64) -> Self {
         let effective_size = effective_size.min(of as f64);
         let rate = (of > 0).then(|| successes as f64 / of as f64);
@@ -65,7 +65,7 @@ impl Rate {
             Some("no layouts".to_owned())
         } else if effective_size < SMALL_SAMPLE {
             Some(format!(
-                "small sample: worth {effective_size:.0} independent layouts"
+                "small sample: effective sample size {effective_size:.0}"
             ))
         } else if successes < FEW_EVENTS {
             Some(format!("small sample: {successes} successes"))
@@ -91,7 +91,7 @@ pub fn clopper_pearson(share: f64, size: f64) -> Interval {
     clopper_pearson_with(share, size, TAIL)
 }
 
-/// The same with another chance that the truth is beyond each end.
+/// The same with another probability that the true value is beyond each end.
 pub(crate) fn clopper_pearson_with(share: f64, size: f64, tail: f64) -> Interval {
     let share = share.clamp(0.0, 1.0);
     if size <= 0.0 || size.is_nan() {
@@ -105,34 +105,19 @@ pub(crate) fn clopper_pearson_with(share: f64, size: f64, tail: f64) -> Interval
         low: if share <= 0.0 {
             0.0
         } else {
-            beta_quantile(successes, failures + 1.0, tail)
+            beta::quantile(successes, failures + 1.0, tail)
         },
         high: if share >= 1.0 {
             1.0
         } else {
-            1.0 - beta_quantile(failures, successes + 1.0, tail)
+            1.0 - beta::quantile(failures, successes + 1.0, tail)
         },
     }
 }
 
-/// 97.5 % quantile of Student's distribution.
-pub(crate) fn student(degrees_of_freedom: usize) -> f64 {
-    student_with(degrees_of_freedom as f64, TAIL)
-}
-
-/// The value that Student's distribution exceeds with a probability below one half.
-pub(crate) fn student_with(degrees_of_freedom: f64, tail: f64) -> f64 {
-    if degrees_of_freedom <= 0.0 {
-        return f64::INFINITY;
-    }
-    // Abramowitz and Stegun 26.7.1: df / (df + t^2) is of the beta distribution.
-    let x = beta_quantile(0.5 * degrees_of_freedom, 0.5, 2.0 * tail);
-    (degrees_of_freedom * (1.0 - x) / x).sqrt()
-}
-
 /// Interval of a mean from its standard error.
 pub(crate) fn about_mean(mean: f64, standard_error: f64, degrees_of_freedom: usize) -> Interval {
-    let half = student(degrees_of_freedom) * standard_error;
+    let half = student::exceeded_with(TAIL, degrees_of_freedom as f64) * standard_error;
     Interval {
         low: mean - half,
         high: mean + half,
@@ -259,8 +244,8 @@ mod tests {
     fn small_samples_are_called_so() {
         let remark = |successes, of, size| Rate::new(successes, of, size).remark;
         assert_eq!(remark(50, 100, 100.0), None);
-        assert!(remark(10, 20, 20.0).unwrap().contains("20 independent"));
-        assert!(remark(50, 100, 10.0).unwrap().contains("10 independent"));
+        assert!(remark(10, 20, 20.0).unwrap().contains("sample size 20"));
+        assert!(remark(50, 100, 10.0).unwrap().contains("sample size 10"));
         assert!(remark(99, 100, 100.0).unwrap().contains("1 failures"));
         assert!(remark(2, 100, 100.0).unwrap().contains("2 successes"));
         assert_eq!(Rate::new(0, 0, 0.0).rate, None);
@@ -269,7 +254,8 @@ mod tests {
     #[test]
     fn student_is_that_of_the_tables() {
         for (n, expected) in [(1, 12.7062), (11, 2.2010), (30, 2.0423), (63, 1.9983)] {
-            assert!((student(n) - expected).abs() < 5e-5, "{n}: {}", student(n));
+            let found = student::exceeded_with(TAIL, f64::from(n));
+            assert!((found - expected).abs() < 5e-5, "{n}: {found}");
         }
     }
 

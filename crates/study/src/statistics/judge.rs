@@ -1,8 +1,8 @@
-//! Whether a study shows what it has to.
+//! Evaluates the criteria of a study.
 
-use needlebench_cell::Limit;
-use needlebench_cell::study_criteria::{BEST, EVERY, QuantileCriterion, StudyCriteria};
+use needlebench_input::Limit;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::study_criteria::{BEST, EVERY, QuantileCriterion, StudyCriteria};
 use serde::{Deserialize, Serialize};
 
 use super::interval::{Interval, Rate};
@@ -14,44 +14,44 @@ use crate::MetricColumn;
 pub struct CriterionResult {
     /// Key of the criterion.
     pub criterion: String,
-    /// Configuration that it is about, or `best`; none of the layouts as such.
+    /// The configuration it applies to, or `best`; none where it applies to layouts.
     pub of: Option<String>,
-    /// Label of the choice that it is judged on, the best one; none where nothing is ours to choose.
+    /// Label of the candidate it is evaluated on, the best one; none without control factors.
     pub choice: Option<String>,
     /// Whether it is met.
     pub pass: bool,
-    /// The estimate; none where there is nothing to estimate it from.
+    /// The estimate; none without data.
     pub value: Option<f64>,
-    /// Its 95 % interval.
+    /// Its 95 % confidence interval.
     pub interval: Option<Interval>,
     /// The limit.
     pub limit: f64,
     /// Unit of the three; `1` of a share.
     pub unit: String,
-    /// Whether the unfavourable end of the interval was judged instead of the estimate.
+    /// Whether the unfavourable end of the interval was tested instead of the estimate.
     pub confidence: bool,
-    /// In words: what was judged, and what to keep in mind.
+    /// What was evaluated, in words, with remarks.
     pub detail: String,
     /// Numbers of the worst cases, whatever the verdict.
     pub cases: Vec<u64>,
-    /// The requirement that it stands for, where the study says.
+    /// The requirement it verifies, if the study names one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub requirement: Option<String>,
 }
 
 impl CriterionResult {
-    /// Whether there was anything to judge it by; if not, it is neither met nor missed.
+    /// Whether it was evaluated; if not, it is neither met nor failed.
     pub fn is_judged(&self) -> bool {
         self.value.is_some() && (!self.confidence || self.interval.is_some())
     }
 
-    /// Judged and not met.
+    /// Evaluated and not met.
     pub fn is_missed(&self) -> bool {
         self.is_judged() && !self.pass
     }
 }
 
-/// What is judged.
+/// A criterion with its estimate.
 struct Judged {
     criterion: &'static str,
     of: Option<String>,
@@ -78,8 +78,8 @@ impl Judged {
             self.value
         };
         let detail = match (self.value, judged) {
-            (None, _) => format!("{}: there are no values", self.what),
-            (Some(_), None) => format!("{}: the sample is too small for an interval", self.what),
+            (None, _) => format!("{}: no values", self.what),
+            (Some(_), None) => format!("{}: sample too small for a confidence interval", self.what),
             _ => self.what,
         };
         CriterionResult {
@@ -99,16 +99,16 @@ impl Judged {
     }
 }
 
-/// Judges a study: where something is ours to choose, with the best choice alone. One result per criterion, or per configuration of a criterion on `every`, in the
-/// order of the keys.
+/// Evaluates the criteria of a study, with control factors on the best candidate alone. One result per criterion,
+/// or per configuration of a criterion on `every`, in the order of the keys.
 pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<CriterionResult> {
     let mut judged = Vec::new();
     let k = criteria.working_configurations.unwrap_or(1).clamp(1, 8) as usize;
     let overall = &summary.overall;
     if let Some(limit) = criteria.min_layouts_working {
         let what = match k {
-            1 => "layouts in which at least one configuration is ok".to_owned(),
-            _ => format!("layouts in which at least {k} configurations are ok"),
+            1 => "layouts with at least one feasible configuration".to_owned(),
+            _ => format!("layouts with at least {k} feasible configurations"),
         };
         let cases = summary.evidence.fewer_than[k - 1].clone();
         judged.push(of_rate(
@@ -128,7 +128,7 @@ pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<Criterion
             };
             let cases = summary.evidence.configurations[index].not_ok.clone();
             let rate = &overall.configurations[index].success;
-            let what = format!("layouts in which {label} is ok");
+            let what = format!("layouts in which {label} is feasible");
             judged.push(Judged {
                 of: Some(label.to_owned()),
                 ..of_rate("min_success_rate", rate, *limit, what, cases)
@@ -136,13 +136,13 @@ pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<Criterion
         }
     }
     if let Some(limit) = criteria.max_invalid_layouts {
-        // Layouts of one sampled point are taken for one: no more is known of how alike they are.
+        // Layouts of one sampled point count as one: their correlation is not known.
         let rate = Rate::new(
             overall.invalid,
             overall.cases,
             overall.cases as f64 / summary.repeats as f64,
         );
-        let what = "layouts that cannot exist".to_owned();
+        let what = "invalid layouts".to_owned();
         judged.push(Judged {
             limit: Limit {
                 value: limit,
@@ -181,13 +181,10 @@ pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<Criterion
     }
     let on = summary.of_choice.as_ref().map(|choice| {
         let held_out = choice.held_out.map_or(String::new(), |share| {
-            format!(
-                "; picked on one half of the points, a choice works in {:.1} % of the other half",
-                100.0 * share
-            )
+            format!("; split-half validation {:.1} %", 100.0 * share)
         });
         format!(
-            "with the best of {} choices, {}, picked on the same layouts{held_out}",
+            "with the best of {} candidates, {}, selected on the same layouts{held_out}",
             choice.of, choice.label
         )
     });
@@ -195,10 +192,10 @@ pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<Criterion
         .into_iter()
         .map(|mut each| {
             if let Some(why) = &summary.not_ranked {
-                // Of all choices together a number answers no question.
+                // A number over all candidates together has no meaning.
                 (each.value, each.interval) = (None, None);
                 each.cases = Vec::new();
-                each.what = format!("{} with the best choice; {why}", each.what);
+                each.what = format!("{} with the best candidate; {why}", each.what);
             } else if let Some(on) = &on {
                 each.what = format!("{}, {on}", each.what);
             }
@@ -234,7 +231,7 @@ fn of_rate(
     }
 }
 
-/// A criterion on one column: one verdict, or of `every` one for each configuration that has values.
+/// A criterion on one column: one verdict, or for `every` one for each configuration that has values.
 fn of_column(
     summary: &Summary,
     criterion: &QuantileCriterion<'_>,
@@ -245,7 +242,7 @@ fn of_column(
         return vec![one(criterion.of)];
     }
     let labels = Configuration::ALL.iter().map(|each| each.label());
-    // A configuration that is always rejected has no values, and nothing to be judged by.
+    // A configuration that is always rejected has no values to evaluate.
     let seen = labels.filter(|label| summary.spread(label, &column.name).is_some());
     let all: Vec<Judged> = seen.map(one).collect();
     if all.is_empty() {
@@ -286,12 +283,11 @@ fn of_quantile(
         limit: criterion.limit,
         unit: column.map_or_else(|| "mm".to_owned(), |column| column.unit.clone()),
         what: match (column, spread, quantile) {
-            (_, Some(_), None) => format!("the summary lacks the {percent} % quantile"),
-            (None, ..) => format!("{percent} % quantile of {who}: the study does not measure it"),
-            (Some(column), ..) => format!(
-                "{percent} % quantile of {} of {who} over {count} layouts",
-                column.words
-            ),
+            (_, Some(_), None) => format!("the summary lacks P{percent}"),
+            (None, ..) => format!("P{percent} of {who}: not measured in this study"),
+            (Some(column), ..) => {
+                format!("P{percent} {} of {who} over {count} layouts", column.words)
+            }
         },
         cases: cases.collect(),
     }

@@ -6,14 +6,14 @@ use crate::{CaseResult, FactorValue, MetricColumn, Outcome, Results, ResultsErro
 /// Number of configurations.
 pub(crate) const CONFIGURATIONS: usize = 8;
 
-/// What became of a layout, over its configurations.
+/// The outcome of a layout, over its configurations.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Layout {
     /// Configurations that are ok, as bits.
     pub ok: u8,
-    /// Configurations that were not judged, as bits.
+    /// Configurations that were not evaluated, as bits.
     pub not_judged: u8,
-    /// Whether the needle keeps away from bone, vessels and organs, where that is asked about and known.
+    /// Whether the needle path has the required clearance from bone, vessels and organs, where required and known.
     pub keeps_away: Option<bool>,
     /// Configuration with the largest clearance of those that are ok; the first of equal ones.
     pub best: Option<usize>,
@@ -26,7 +26,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// None of a layout that cannot exist.
+    /// None of an invalid layout.
     pub(crate) fn of(result: &CaseResult, measures: &Measures) -> Option<Self> {
         let mut layout = Self {
             ok: 0,
@@ -69,7 +69,7 @@ impl Layout {
         self.ok.count_ones() as usize
     }
 
-    /// Number of configurations that are ok or were not judged.
+    /// Number of configurations that are ok or were not evaluated.
     pub(crate) fn may_work(&self) -> usize {
         (self.ok | self.not_judged).count_ones() as usize
     }
@@ -91,7 +91,7 @@ impl BestConfiguration {
     }
 
     /// Index of the configuration with the largest clearance of those that are ok, the first of equal
-    /// ones; none where none is ok or the layout cannot exist.
+    /// ones; none where none is ok or the layout is invalid.
     pub fn of(&self, result: &CaseResult) -> Option<usize> {
         Layout::of(result, &self.0)?.best
     }
@@ -105,7 +105,7 @@ pub(crate) fn has_numbers(row: &Row) -> bool {
     )
 }
 
-/// Visits all cases and refuses such as do not fit the factors.
+/// Visits all cases and rejects those that do not match the factors.
 pub(crate) fn visit_checked(
     results: &dyn Results,
     mut visit: impl FnMut(&[FactorValue], &CaseResult),
@@ -135,10 +135,7 @@ pub(crate) fn visit_checked(
             seen += 1;
             visit(values, result);
         } else {
-            wrong = Some(format!(
-                "case {} has values that its factors cannot have",
-                result.case
-            ));
+            wrong = Some(format!("case {} has invalid factor values", result.case));
         }
     })?;
     if wrong.is_none() && seen != results.cases() {

@@ -1,76 +1,76 @@
-//! How the numbers were found, and what to keep in mind about them.
+//! Methods of the statistics, and notes on them.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Sampling, Summary, varies};
 use crate::Factor;
 
-/// How numbers were found.
+/// Method of one kind of numbers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Method {
-    /// Numbers that were found so.
+    /// The numbers.
     pub numbers: String,
-    /// How.
+    /// The method.
     pub method: String,
-    /// Who says so.
+    /// The source.
     pub source: String,
 }
 
 const METHODS: [[&str; 3]; 9] = [
     [
-        "intervals of rates",
-        "Clopper and Pearson's, 95 %, of the effective number of layouts",
+        "confidence intervals of rates",
+        "Clopper-Pearson, 95 %, with the effective sample size",
         "Clopper, Pearson, Biometrika 26 (1934) 404; Korn, Graubard, Surv. Methodol. 24 (1998) 193",
     ],
     [
-        "effective number of layouts",
-        "layouts over the design effect, from the spread of 256 random groups of the sampled points and one \
-         point more that has the rarer outcome as a whole, times the squared ratio of Student's quantiles \
-         with as many degrees of freedom as layouts and as groups, less one each; never fewer than the \
-         points, which are counted where all layouts work or none does",
+        "effective sample size",
+        "number of layouts divided by the design effect (from the spread of 256 random groups of the sampled \
+         points, plus one point with the rarer outcome throughout), times the squared ratio of Student's \
+         quantiles with (layouts - 1) and (groups - 1) degrees of freedom; at least the number of points, which \
+         is used where all layouts are feasible or none is",
         "Korn, Graubard (1998); Kish, Survey Sampling (1965); the coverage is simulated in the tests",
     ],
     [
         "quantiles",
-        "exact order statistics, linear in between (type 7)",
+        "exact order statistics, linear interpolation (type 7)",
         "Hyndman, Fan, Am. Stat. 50 (1996) 361",
     ],
     [
-        "intervals of quantiles",
-        "order statistics by the binomial distribution, at least 95 %, without any assumption on the \
-         distribution; layouts of one sampled point count as one",
+        "confidence intervals of quantiles",
+        "distribution-free, from order statistics and the binomial distribution, at least 95 %; layouts of one \
+         sampled point count as one",
         "David, Nagaraja, Order Statistics (2003), section 7.1",
     ],
     [
         "main effects",
-        "share of the variance between the means of levels or bins, less what chance makes of it \
-         (epsilon squared); estimates the first-order Sobol index of an independent factor, too low by \
-         the variance within bins: 1/256 of the whole where a response is linear over 16 bins",
+        "share of the variance between the means of levels or bins, corrected for chance (epsilon squared); \
+         estimates the first-order Sobol index of an independent factor; too low by the variance within bins: \
+         1/256 of the total for a response that is linear over 16 bins",
         "Kelley, Proc. Natl. Acad. Sci. 21 (1935) 554; Sobol, Math. Model. Comput. Exp. 1 (1993) 407",
     ],
     [
         "interactions",
-        "epsilon squared of the cells of two factors less that of each; estimates the second-order \
-         Sobol index of independent factors, too low by the variance within cells",
+        "epsilon squared of the cells of two factors minus that of each factor; estimates the second-order \
+         Sobol index of independent factors; too low by the variance within cells",
         "Saltelli et al., Global Sensitivity Analysis (2008), chapter 1",
     ],
     [
         "maps",
-        "a configuration wins a cell where the interval of its share of best clearances is above \
-         that of every other",
-        "as the intervals of rates; not corrected for the number of cells",
+        "a configuration wins a cell if the confidence interval of its share of best clearances is above that \
+         of every other",
+        "as the confidence intervals of rates; not corrected for the number of cells",
     ],
     [
-        "choices against the first",
-        "difference of the shares with Student's interval from random groups of the sampled points, \
-         paired by the point; at least 6 layouts apart, as an exact McNemar test needs; not corrected \
-         for the number of choices",
+        "candidates compared with no. 1",
+        "difference of the success rates with Student's interval from random groups of the sampled points, \
+         paired by point; significant only if at least 6 layouts differ, as the exact McNemar test requires; \
+         not corrected for the number of candidates",
         "Wolter (2007), chapter 2; McNemar, Psychometrika 12 (1947) 153",
     ],
     [
         "best configuration of a layout",
-        "the largest clearance of those that are ok, the first of equal ones: the nearest approach along \
-         the simulated motion; of planned cases along the planned one, of static cases in their posture",
+        "the feasible configuration with the largest clearance, the first of equal ones; minimum clearance along \
+         the simulated motion (planned cases: planned motion; static cases: posture)",
         "definition",
     ],
 ];
@@ -85,7 +85,7 @@ pub(crate) fn methods() -> Vec<Method> {
         .to_vec()
 }
 
-/// What to keep in mind about a summary.
+/// Notes on a summary.
 pub(crate) fn notes(summary: &Summary, factors: &[Factor], paired: usize) -> Vec<String> {
     let mut notes = Vec::new();
     let sampled = factors
@@ -93,13 +93,13 @@ pub(crate) fn notes(summary: &Summary, factors: &[Factor], paired: usize) -> Vec
         .any(|factor| factor.is_sampled() && varies(factor));
     match summary.sampling {
         _ if !sampled => notes.push(
-            "nothing is sampled: rates are exact for this grid, and their intervals are those of as \
-             many independent layouts"
+            "no factor is sampled: rates are exact for this grid; their confidence intervals assume as many \
+             independent layouts"
                 .to_owned(),
         ),
         Sampling::Sobol | Sampling::LatinHypercube => notes.push(
-            "the points fill the space more evenly than random ones: intervals are those of random \
-             points and as a rule wider than they need be"
+            "the points fill the space more evenly than random ones; confidence intervals assume random points and \
+             are usually conservative"
                 .to_owned(),
         ),
         Sampling::Random => {}
@@ -111,55 +111,55 @@ pub(crate) fn notes(summary: &Summary, factors: &[Factor], paired: usize) -> Vec
             .first()
             .map_or(0.0, |rate| rate.effective_size);
         notes.push(format!(
-            "each sampled point appears in {} cases: {} valid layouts are worth {worth:.0} independent \
-             ones for the rate of layouts that work",
+            "each sampled point appears in {} cases: the effective sample size of {} valid layouts is {worth:.0} \
+             for the rate of feasible layouts",
             summary.repeats, overall.layouts
         ));
     }
     if overall.layouts == 0 {
-        notes.push("no layout is valid: there is nothing to sum up".to_owned());
+        notes.push("no layout is valid: no statistics".to_owned());
     } else if overall.layouts < 30 {
         notes.push(format!(
-            "small sample: {} valid layouts; take no share or quantile for more than a hint",
+            "small sample: {} valid layouts; rates and quantiles are only indicative",
             overall.layouts
         ));
     }
     if overall.invalid > 0 {
         notes.push(format!(
-            "{} of {} layouts cannot exist and are in no rate; the factors of those that are left may \
-             depend on each other, and effects then overlap",
+            "{} of {} layouts are invalid and excluded from all rates; factors of the remaining layouts may be \
+             dependent, and effects then overlap",
             overall.invalid, overall.cases
         ));
     }
     let with_best: u64 = overall.configurations.iter().map(|each| each.best).sum();
     if with_best < overall.layouts {
         notes.push(format!(
-            "the best configuration is of the {with_best} layouts that have one: look at its clearance \
-             and tip error together with the rate of layouts that work"
+            "statistics of the best configuration cover the {with_best} feasible layouts: read its clearance and tip \
+             error together with the rate of feasible layouts"
         ));
     }
     if paired < summary.effects.axes.len() {
         notes.push(format!(
-            "pairs of factors: of the {paired} with the largest main effects"
+            "interactions: only of the {paired} factors with the largest main effects"
         ));
     }
     if let Some(choices) = &summary.choices {
         if !choices.paired {
             notes.push(
-                "the choices did not meet the same circumstances: their differences are not paired"
+                "candidates were not evaluated on the same noise factors: their differences are not paired"
                     .to_owned(),
             );
         }
         if choices.validity_differs {
             notes.push(
-                "the choices differ in which layouts can exist: look at the invalid cases before the \
-                 rates, which are of valid layouts"
+                "candidates differ in which layouts are valid: check the invalid cases before the rates, which cover \
+                 valid layouts only"
                     .to_owned(),
             );
         }
         if choices.axes.iter().any(|axis| axis.coarse) {
             notes.push(
-                "sampled choices are ranked by ranges: a range holds good and bad values"
+                "sampled candidates are ranked by ranges: a range contains good and bad values"
                     .to_owned(),
             );
         }

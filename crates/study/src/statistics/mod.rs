@@ -5,7 +5,6 @@
 //! alone. Lengths are in mm and angles in degrees, as in the table; shares are 0 to 1.
 
 mod axis;
-mod beta;
 mod choices;
 mod counts;
 #[cfg(test)]
@@ -28,7 +27,7 @@ mod tests;
 
 use std::rc::Rc;
 
-use needlebench_cell::study_criteria::StudyCriteria;
+use needlebench_scenario::study_criteria::StudyCriteria;
 use serde::{Deserialize, Serialize};
 
 pub use axis::{Axis, Bin};
@@ -70,23 +69,23 @@ const MOST_MAP_BINS: usize = 12;
 /// Factors whose pairs are looked at, at most.
 const MOST_PAIRED: usize = 10;
 
-pub use needlebench_cell::study::SamplingMethod as Sampling;
+pub use needlebench_scenario::study::SamplingMethod as Sampling;
 
 /// What to sum up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SummaryOptions {
-    /// How the points were chosen, which the remarks on intervals depend on.
+    /// Sampling method, which the remarks on intervals depend on.
     pub sampling: Sampling,
-    /// Configurations that have to be ok in [`Choice::works_k`], 1 to 8.
+    /// Required feasible configurations in [`Choice::works_k`], 1 to 8.
     pub working_configurations: usize,
-    /// Configurations that have to be ok for choices to be ranked by it, 1 to 8.
+    /// Required feasible configurations in the ranking of candidates, 1 to 8.
     pub ranked_configurations: usize,
     /// Quantiles to give beside [`PROBABILITIES`], such as those of criteria.
     pub more_quantiles: Vec<f64>,
-    /// Whether to give effects, maps and the ranking of choices.
+    /// Whether to give effects, maps and the ranking of candidates.
     pub factors: bool,
-    /// How far needles are to keep away from bone, vessels and organs, mm, where that is no part of what works: rates are
-    /// then given with it and without.
+    /// Required clearance of the needle path from bone, vessels and organs, mm, where feasibility does not include it:
+    /// rates are then given with it and without.
     pub route_mm: Option<f64>,
 }
 
@@ -104,7 +103,7 @@ impl Default for SummaryOptions {
 }
 
 impl SummaryOptions {
-    /// With what it takes to judge by criteria.
+    /// With the options that criteria require.
     #[must_use]
     pub fn judged_by(mut self, criteria: &StudyCriteria) -> Self {
         if let Some(count) = criteria.working_configurations.filter(|count| *count > 1) {
@@ -129,47 +128,47 @@ pub struct Summary {
     pub sampling: Sampling,
     /// Cases that each sampled point appears in: once in each combination of the crossed factors.
     pub repeats: u64,
-    /// The choice that `overall`, `goals`, `spreads` and `evidence` are of; none where nothing is ours to
-    /// choose, or where there is too much of it to be ranked.
+    /// The candidate that `overall`, `goals`, `spreads` and `evidence` refer to; none without control factors, or where
+    /// there are too many candidates to be ranked.
     pub of_choice: Option<ChosenChoice>,
-    /// Why choices are not ranked, in words: `overall` and the others are then of all choices together,
-    /// which answers no question, and no criterion is judged by them.
+    /// Why candidates are not ranked, in words: `overall` and the others are then of all candidates together, and no
+    /// criterion is evaluated on them.
     pub not_ranked: Option<String>,
-    /// What became of all cases, of all those of the best choice.
+    /// Outcomes of all cases, or of those of the best candidate.
     pub overall: Counts,
     /// The same by goal.
     pub goals: Vec<Counts>,
-    /// What became of the cases of all choices together; none where nothing is ours to choose.
+    /// Outcomes of the cases of all candidates together; none without control factors.
     pub over_all_choices: Option<Counts>,
     /// The metrics that are summed up.
     pub metrics: Vec<MetricColumn>,
     /// Their spread, configuration by configuration, the best of each layout last.
     pub spreads: Vec<Spread>,
-    /// What the factors do.
+    /// Effects of the factors.
     pub effects: Effects,
     /// Which configuration is the best where.
     pub regions: Regions,
-    /// Which choice is the best; none where nothing is ours to choose.
+    /// Ranking of the candidates; none without control factors.
     pub choices: Option<ChoiceRanking>,
-    /// Cases that are worth a look.
+    /// Cases to inspect.
     pub evidence: Evidence,
-    /// What to keep in mind, in words.
+    /// Notes, in words.
     pub notes: Vec<String>,
-    /// How the numbers were found, with sources.
+    /// Methods, with sources.
     pub methods: Vec<Method>,
 }
 
-/// The choice that a summary is of.
+/// The candidate that a summary refers to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChosenChoice {
     /// In tables.
     pub label: String,
-    /// Number of choices that it is the best of.
+    /// Number of candidates that it is the best of.
     pub of: u64,
-    /// Choices that cannot be told apart from it.
+    /// Candidates not significantly different from it.
     pub as_good: u64,
-    /// Confidence of its intervals: that they hold for all choices at once is 95 % (Bonferroni), so that
-    /// picking the best does not flatter it.
+    /// Individual confidence of its intervals: simultaneously 95 % for all candidates (Bonferroni), which accounts for
+    /// the selection of the best.
     pub confidence_each: f64,
     /// As [`ChoiceRanking::ranked_by`].
     pub by: String,
@@ -184,7 +183,7 @@ impl Summary {
         all.find(|each| each.of == of && each.metric == metric)
     }
 
-    /// The metrics that have values and stand for something: one of each kind of cases.
+    /// The metrics of a measure that have values: one of each kind of cases.
     pub fn measured(&self, measure: Measure) -> impl Iterator<Item = &MetricColumn> {
         let of_measure = move |column: &&MetricColumn| column.measure == Some(measure);
         self.metrics.iter().filter(of_measure).filter(|column| {
@@ -379,7 +378,7 @@ fn by_goal(
         .collect()
 }
 
-/// The cases of one choice.
+/// The cases of one candidate.
 struct OneChoice<'a> {
     results: &'a dyn Results,
     counter: &'a ChoiceCounter,
@@ -411,7 +410,7 @@ impl Results for OneChoice<'_> {
     }
 }
 
-/// Makes the head of a summary that of the best choice.
+/// Makes the head of a summary that of the best candidate.
 fn narrow(
     summary: &mut Summary,
     results: &OneChoice<'_>,

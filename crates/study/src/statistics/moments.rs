@@ -1,6 +1,8 @@
 //! Means, variances, and what repeated points make of them.
 
-use super::interval::student_with;
+use needlebench_numerics::random::SplitMix64;
+use needlebench_numerics::student;
+
 use crate::{Factor, FactorKind, FactorValue, Role};
 
 /// Count, mean and variance of a stream, about its first value so that nothing cancels.
@@ -58,14 +60,14 @@ pub(crate) struct Points {
 }
 
 impl Points {
-    /// Points of sampled circumstances; without such, of whatever is sampled; without any, of all
-    /// circumstances, or of all factors. Sampled factors have the same points in each combination of the
+    /// Points of sampled noise factors; without such, of whatever is sampled; without any, of all
+    /// noise factors, or of all factors. Sampled factors have the same points in each combination of the
     /// crossed ones, so that each point appears in as many cases as there are combinations.
     pub(crate) fn new(factors: &[Factor]) -> Self {
         Self::repeated(factors, |_| true)
     }
 
-    /// The points of the cases of one choice.
+    /// The points of the cases of one candidate.
     pub(crate) fn of_one_choice(factors: &[Factor]) -> Self {
         Self::repeated(factors, |factor| factor.role == Role::Circumstance)
     }
@@ -97,7 +99,7 @@ impl Points {
         }
     }
 
-    /// All circumstances together.
+    /// All noise factors together.
     pub(crate) fn of_circumstances(factors: &[Factor]) -> Self {
         let all = factors.iter().enumerate();
         let keys = all.filter(|(_, factor)| factor.role == Role::Circumstance);
@@ -123,31 +125,22 @@ impl Points {
     /// What identifies the point of a case.
     pub(crate) fn hash(&self, values: &[FactorValue]) -> u64 {
         self.keys.iter().fold(0, |hash, &key| {
-            mixed(
-                hash ^ match values[key] {
-                    FactorValue::Level(level) => level as u64,
-                    FactorValue::Number(number) => number.to_bits(),
-                },
-            )
+            let value = match values[key] {
+                FactorValue::Level(level) => level as u64,
+                FactorValue::Number(number) => number.to_bits(),
+            };
+            SplitMix64::new(hash ^ value).next_u64()
         })
     }
 }
 
-/// Combinations of the levels of those factors that are wanted.
+/// Combinations of the levels of the selected factors.
 pub(crate) fn combinations(factors: &[Factor], wanted: impl Fn(&Factor) -> bool) -> u64 {
     let levels = factors.iter().filter(|each| wanted(each));
     levels.fold(1_u64, |product, factor| match &factor.kind {
         FactorKind::Levels(levels) => product.saturating_mul(levels.len().max(1) as u64),
         FactorKind::Continuous { .. } => product,
     })
-}
-
-/// Finaliser of `SplitMix64` (Steele, Lea, Flood, 2014): every bit depends on every other.
-fn mixed(value: u64) -> u64 {
-    let mut z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 /// Sums of a response over random groups of the sampled points.
@@ -245,7 +238,8 @@ impl Grouped {
         let groups = groups.count() as f64;
         let squared_error = (groups + 1.0) / groups * squares / (all * all);
         let effect = (squared_error * all / (share * (1.0 - share))).clamp(1.0, of_point);
-        let small = student_with(count - 1.0, tail) / student_with(groups - 1.0, tail);
+        let small =
+            student::exceeded_with(tail, count - 1.0) / student::exceeded_with(tail, groups - 1.0);
         (count / effect * small * small).clamp(points, count)
     }
 

@@ -39,7 +39,7 @@ pub struct RegionCell {
     /// Layouts in which each configuration is the best: ok, with the largest clearance.
     pub best: [u64; CONFIGURATIONS],
     /// Label of the configuration that is the best more often than any other; none where its
-    /// interval overlaps with the next one's, or where none ever works.
+    /// interval overlaps with the next one's, or where none is ever feasible.
     pub winner: Option<String>,
 }
 
@@ -63,8 +63,8 @@ impl Counter {
         }
     }
 
-    /// `most` layouts of a point are in the cell, and layouts are `design_effect` times less worth than
-    /// independent ones.
+    /// `most` layouts of a point are in the cell, and the effective sample size is that of the layouts
+    /// over `design_effect`.
     fn winner(&self, design_effect: f64, most: f64) -> Option<String> {
         let mut order: Vec<usize> = (0..CONFIGURATIONS).collect();
         order.sort_by_key(|&index| std::cmp::Reverse(self.best[index]));

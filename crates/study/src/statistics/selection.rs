@@ -7,6 +7,8 @@
 
 use std::rc::Rc;
 
+use needlebench_numerics::order::quantile_position;
+
 use super::interval::{Interval, TAIL, quantile_ranks};
 
 /// Times that a selector has to see all values.
@@ -187,7 +189,7 @@ impl Quantiles {
         Self::with_tail(probabilities, repeats, TAIL)
     }
 
-    /// The same with another chance that the truth is beyond each end of an interval.
+    /// The same with another probability that the true value is beyond each end of an interval.
     pub(crate) fn with_tail(probabilities: Rc<[f64]>, repeats: u64, tail: f64) -> Self {
         Self {
             selector: Selector::new(),
@@ -211,7 +213,7 @@ impl Quantiles {
         self.selector.next_pass(|count| {
             let mut ranks = Vec::new();
             for &p in probabilities.iter() {
-                let (low, _) = type_7(count, p);
+                let (low, _) = quantile_position(count, p);
                 ranks.extend([low, low + 1]);
                 let (low, high) = interval_ranks(count, p, repeats, tail);
                 ranks.extend([low, high].into_iter().flatten());
@@ -222,7 +224,7 @@ impl Quantiles {
 
     /// The quantile of type 7, after all passes; none of no values.
     pub(crate) fn value(&self, p: f64) -> Option<f64> {
-        let (low, share) = type_7(self.count(), p);
+        let (low, share) = quantile_position(self.count(), p);
         let at = f64::from(self.selector.value(low)?);
         Some(match self.selector.value(low + 1) {
             Some(next) if share > 0.0 => at + share * (f64::from(next) - at),
@@ -238,18 +240,6 @@ impl Quantiles {
             high: f64::from(self.selector.value(high?)?),
         })
     }
-}
-
-/// Rank, from 0, at or below a quantile of Hyndman and Fan's type 7, and the share of the way to the
-/// next.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "between 0 and the number of values"
-)]
-fn type_7(count: u64, p: f64) -> (u64, f64) {
-    let position = count.saturating_sub(1) as f64 * p;
-    (position.floor() as u64, position.fract())
 }
 
 /// Ranks, from 0, of the ends of a quantile's interval. Values of one sampled point are counted as
@@ -273,7 +263,7 @@ fn interval_ranks(count: u64, p: f64, repeats: u64, tail: f64) -> (Option<u64>, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
 
     const PROBABILITIES: [f64; 9] = [0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0];
 
@@ -292,7 +282,7 @@ mod tests {
     fn sorted_quantile(values: &[f32], p: f64) -> f64 {
         let mut sorted = values.to_vec();
         sorted.sort_by(f32::total_cmp);
-        let (low, share) = type_7(sorted.len() as u64, p);
+        let (low, share) = quantile_position(sorted.len() as u64, p);
         let at =
             |rank: u64| f64::from(sorted[usize::try_from(rank).unwrap().min(sorted.len() - 1)]);
         at(low) + share * (at(low + 1) - at(low))

@@ -1,4 +1,4 @@
-//! Results whose truth is known.
+//! Results with known true values.
 
 use crate::{
     CaseResult, Factor, FactorKind, FactorValue, Level, Measure, MetricColumn, Outcome, Results,
@@ -112,7 +112,7 @@ pub(crate) fn ok(index: u8, clearance_mm: f64, tip_error_mm: f64) -> Row {
 
 /// A number in (0, 1) that depends on a seed, a case and a column alone.
 pub(crate) fn uniform(seed: u64, case: u64, column: u64) -> f64 {
-    use needlebench_kinematics::random::SplitMix64;
+    use needlebench_numerics::random::SplitMix64;
     let mut random = SplitMix64::new(seed ^ case.wrapping_mul(0x9e37_79b9) ^ column << 48);
     random.next_u64();
     random.uniform(0.0, 1.0)

@@ -1,4 +1,4 @@
-use needlebench_cell::study_criteria::{LowerQuantile, StudyCriteria, UpperQuantile};
+use needlebench_scenario::study_criteria::{LowerQuantile, StudyCriteria, UpperQuantile};
 
 use super::synthetic::{Synthetic, columns, continuous, goal, levels, ok, rejected, uniform};
 use super::*;
@@ -468,7 +468,7 @@ fn a_study_is_judged_by_its_best_choice_and_not_by_all_of_them_together() {
         assert!(result.pass, "{result:?}");
         assert_eq!(result.choice.as_deref(), Some("good"));
         assert!(
-            result.detail.contains("best of 3 choices, good"),
+            result.detail.contains("best of 3 candidates, good"),
             "{result:?}"
         );
     }

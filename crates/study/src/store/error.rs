@@ -1,4 +1,4 @@
-//! Why a study does not go on.
+//! Errors of studies.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,12 +12,12 @@ pub(crate) const LOCK: &str = "lock";
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "fields are named in the messages")]
 pub enum StudyError {
-    /// The system refused.
+    /// The operating system reported an error.
     #[error(
         "cannot {action} {}: {source}{}",
         path.display(),
         if *action == LOCK {
-            "\nhint: file systems without locks (flock) cannot say who writes; choose another one"
+            "\nhint: the file system does not support locks (flock); use another one"
         } else {
             ""
         }
@@ -27,7 +27,7 @@ pub enum StudyError {
         path: PathBuf,
         source: io::Error,
     },
-    /// No room left, or the disk failed, while results were written.
+    /// The disk is full or failed while results were written.
     #[error(
         "cannot write {}: {source}\n{kept} of {total} cases are kept in {}; nothing is damaged\n\
          hint: {}continue with --resume",
@@ -53,24 +53,24 @@ pub enum StudyError {
         total: u64,
         folder: PathBuf,
     },
-    /// A thread cannot begin to work.
-    #[error("no worker could be started: {0}")]
+    /// A worker cannot start.
+    #[error("cannot start a worker: {0}")]
     Worker(String),
-    /// Two processes, one folder.
+    /// Another process writes to the folder.
     #[error(
         "{}: another process is writing here\nhint: wait for it or choose another folder",
         folder.display()
     )]
     Locked { folder: PathBuf },
-    /// A journal is another one than when it was looked through.
+    /// A journal has changed since it was scanned.
     #[error(
-        "{}: {change} since it was checked\nhint: merge again once nobody writes to it",
+        "{}: {change} since it was checked\nhint: merge again when no process writes to it",
         path.display()
     )]
     Changed { path: PathBuf, change: String },
     /// The disk is too small for what would be written.
     #[error(
-        "{}: the table will take about {}, and {} are free\n\
+        "{}: the table requires about {}, {} are free\n\
          hint: free some space, or choose another folder; nothing was written",
         folder.display(),
         in_words(*needed_bytes),
@@ -81,13 +81,13 @@ pub enum StudyError {
         needed_bytes: u64,
         free_bytes: u64,
     },
-    /// Results are there, and `--resume` was not asked for.
+    /// Results exist, and `--resume` was not given.
     #[error(
-        "{}: holds {what} already\nhint: --resume continues it; or choose another folder",
+        "{}: already holds {what}\nhint: continue with --resume, or choose another folder",
         folder.display()
     )]
     Exists { folder: PathBuf, what: String },
-    /// Results of another study are there.
+    /// The folder holds results of another study.
     #[error(
         "{}: holds the results of another study\n  there: {found}\n  here:  {expected}{}\n\
          hint: choose another folder",
@@ -103,7 +103,7 @@ pub enum StudyError {
     /// A file of a study that cannot be understood.
     #[error("{}: {message}", path.display())]
     File { path: PathBuf, message: String },
-    /// Nothing can come of such a request.
+    /// An invalid request.
     #[error("{0}")]
     Request(String),
     /// Shards that do not make up a study.
@@ -140,8 +140,8 @@ pub(crate) fn in_words(bytes: u64) -> String {
 }
 
 impl StudyError {
-    /// Whether folders, files or the request are at fault: asked for again, the same comes of it. All else
-    /// may pass.
+    /// Whether folders, files or the request are at fault: a retry gives the same error. All others may be
+    /// transient.
     pub fn is_input(&self) -> bool {
         match self {
             Self::Exists { .. }

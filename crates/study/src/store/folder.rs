@@ -190,13 +190,13 @@ fn check(path: &Path, manifest: &Manifest, resume: bool) -> Result<Option<Status
     let Some(found) = Manifest::read(path)? else {
         if path.join(RESULTS_FILE).exists() {
             let message = format!(
-                "is there without {MANIFEST_FILE}, so nobody knows what it is of\n\
+                "is there without {MANIFEST_FILE}: its study is unknown\n\
                  hint: choose another folder"
             );
             return Err(StudyError::file(&path.join(RESULTS_FILE), message));
         }
         if path.join(JOURNAL_FILE).exists() && !resume {
-            return Err(exists("the beginning of a study"));
+            return Err(exists("an unfinished study"));
         }
         return Ok(None);
     };
@@ -210,7 +210,7 @@ fn check(path: &Path, manifest: &Manifest, resume: bool) -> Result<Option<Status
     };
     if found.shard != manifest.shard {
         let message = format!(
-            "is of {} of this study, not of {}\nhint: every shard needs a folder of its own",
+            "holds {} of this study, not {}\nhint: every shard requires its own folder",
             part(&found),
             part(manifest)
         );
@@ -218,8 +218,8 @@ fn check(path: &Path, manifest: &Manifest, resume: bool) -> Result<Option<Status
     }
     if !resume {
         return Err(exists(match found.status {
-            Status::Complete => "this study, complete,",
-            Status::Running => "this study, not complete,",
+            Status::Complete => "this study (complete)",
+            Status::Running => "this study (incomplete)",
         }));
     }
     Ok(Some(found.status))
@@ -238,7 +238,7 @@ fn data_file(manifest: &Manifest) -> &'static str {
 fn unsound(path: &Path, manifest: &Manifest) -> Result<Option<String>, StudyError> {
     let file = path.join(data_file(manifest));
     if !file.exists() {
-        return Ok(Some("is not there".to_owned()));
+        return Ok(Some("is missing".to_owned()));
     }
     if manifest.shard.is_none() {
         return Ok(match ParquetResults::open(&file) {

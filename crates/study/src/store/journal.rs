@@ -33,7 +33,7 @@ use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 
 use crc32fast::Hasher;
-use needlebench_cell::{InputError, open_input};
+use needlebench_input::{InputError, open_input};
 
 use super::codec::{self, Packed};
 use super::columns::Columns;
@@ -262,7 +262,7 @@ pub(crate) fn kept(manifest: &Manifest, places: &Places) -> u64 {
 pub(crate) fn open(path: &Path) -> Result<File, StudyError> {
     open_input(path).map_err(|error| match error {
         InputError::Io(error) => StudyError::io("read", path)(error),
-        error => StudyError::file(path, format!("is no journal: {error}")),
+        error => StudyError::file(path, format!("is not a journal: {error}")),
     })
 }
 
@@ -347,7 +347,7 @@ pub(crate) fn scan_blocks(
             .filter(|_| manifest.block_len(record.block) == record.cases as usize);
         let Some(place) = place else {
             // Its CRC is right: another version of this program wrote it.
-            let message = format!("has a record at byte {at} that this study does not have");
+            let message = format!("has a record at byte {at} that is not of this study");
             return Err(StudyError::file(path, message));
         };
         let bytes = RECORD_HEADER as u64 + u64::from(record.length);

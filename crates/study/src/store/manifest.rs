@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-use needlebench_cell::{InputError, read_data_text};
+use needlebench_input::{InputError, read_data_text};
 use serde::{Deserialize, Serialize};
 
 use super::atomic::write_atomically;
@@ -123,7 +123,7 @@ impl FromStr for Shard {
         text.split_once('/')
             .and_then(|(part, parts)| Self::new(part.parse().ok()?, parts.parse().ok()?))
             .ok_or_else(|| {
-                format!("\"{text}\" is no shard: expected k/n with k from 1 to n, such as 2/7")
+                format!("\"{text}\" is not a shard: expected k/n with k from 1 to n, such as 2/7")
             })
     }
 }
@@ -314,8 +314,8 @@ impl Manifest {
 
 fn unreadable(path: &Path, error: &dyn fmt::Display) -> StudyError {
     let message = format!(
-        "is no manifest of a study: {error}\n\
-         hint: put back a copy of it, or compute the study in another folder"
+        "is not a study manifest: {error}\n\
+         hint: restore it from a copy, or compute the study in another folder"
     );
     StudyError::file(path, message)
 }

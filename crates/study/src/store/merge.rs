@@ -2,12 +2,12 @@
 //!
 //! There may be more shards than a process may have files. So each journal is locked, looked through and
 //! closed again; where its blocks are stays in memory, and the few that are read at a time are opened anew:
-//! one that has changed meanwhile, or that somebody writes to, is refused.
+//! one that has changed meanwhile, or that a process writes to, is rejected.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use needlebench_cell::{InputError, open_input};
+use needlebench_input::{InputError, open_input};
 
 use super::error::StudyError;
 use super::folder::{Blocks, Folder, Opened, RESULTS_FILE, write_results};
@@ -43,7 +43,7 @@ pub fn merge(
     watch: &(dyn Fn(Progress) + Sync),
 ) -> Result<RunEnd, StudyError> {
     let threads = threads.max(1);
-    let nothing = || StudyError::Merge("there is nothing to merge".to_owned());
+    let nothing = || StudyError::Merge("nothing to merge".to_owned());
     if shards.is_empty() {
         return Err(nothing());
     }
@@ -58,7 +58,7 @@ pub fn merge(
     let whole = |each: &&ShardFolder| each.shard.is_none() && each.status == Status::Complete;
     if let Some(whole) = shards.iter().find(whole) {
         return Err(StudyError::Merge(format!(
-            "{}: holds the whole study already; there is nothing to merge",
+            "{}: already holds the whole study; nothing to merge",
             whole.path.display()
         )));
     }
@@ -162,8 +162,8 @@ fn collect(
                     if !first.same(&second) {
                         let cases = manifest.block(found.block);
                         return Err(StudyError::Merge(format!(
-                            "{} and {} contradict each other in cases {} to {}: one of them was not \
-                             computed by this program",
+                            "{} and {} differ in cases {} to {}: one of them was not computed by this \
+                             program",
                             shards[other].path.display(),
                             folder.path.display(),
                             cases.start,
@@ -198,17 +198,23 @@ fn collect(
     }
 }
 
-/// Looks through a shard's journal, which nobody may write to meanwhile.
+/// Looks through a shard's journal, which no process may write to meanwhile.
 fn scan_shard(shard: &ShardFolder, manifest: &Manifest) -> Result<Scanned, StudyError> {
     let path = shard.path.join(JOURNAL_FILE);
     let file = match open_input(&path) {
         Ok(file) => file,
         Err(error) if error.is_not_found() => {
-            let message = "is not there\nhint: `needlebench study STUDY --shard K/N --resume` computes it again";
+            let message =
+                "is missing\nhint: `needlebench study STUDY --shard K/N --resume` recomputes it";
             return Err(StudyError::file(&path, message));
         }
         Err(InputError::Io(error)) => return Err(StudyError::io("open", &path)(error)),
-        Err(error) => return Err(StudyError::file(&path, format!("is no journal: {error}"))),
+        Err(error) => {
+            return Err(StudyError::file(
+                &path,
+                format!("is not a journal: {error}"),
+            ));
+        }
     };
     lock_to_read(&file, &shard.path)?;
     let length = file.metadata().map_err(StudyError::io("read", &path))?;
@@ -258,16 +264,14 @@ fn missing_message(manifest: &Manifest, shards: &[ShardFolder], missing: &[u64])
             .shard
             .map_or("the study".to_owned(), |part| format!("shard {part}"));
         let damaged = if folder.status == Status::Complete {
-            "was complete and is damaged"
+            "is damaged"
         } else {
-            "is not complete"
+            "is incomplete"
         };
         lines.push(format!("  {}: {part} {damaged}", folder.path.display()));
     }
     if let Some(more) = incomplete.len().checked_sub(NAMED).filter(|more| *more > 0) {
-        lines.push(format!(
-            "  and {more} more that are not complete or damaged"
-        ));
+        lines.push(format!("  and {more} more that are incomplete or damaged"));
     }
     for (parts, lacking) in &lacking {
         let absent = lacking
@@ -276,19 +280,18 @@ fn missing_message(manifest: &Manifest, shards: &[ShardFolder], missing: &[u64])
         let absent: Vec<u32> = absent.copied().collect();
         if absent.len() <= NAMED {
             for part in absent {
-                lines.push(format!("  shard {part}/{parts} is not among the folders"));
+                lines.push(format!("  shard {part}/{parts} has no folder"));
             }
         } else {
             lines.push(format!(
-                "  {} shards of {parts} are not among the folders: {}",
+                "  {} shards of {parts} have no folder: {}",
                 absent.len(),
                 ranges(absent.iter().copied())
             ));
         }
     }
     lines.push(
-        "hint: `needlebench study STUDY --shard K/N --resume` finishes a shard, and computes what is damaged \
-         again"
+        "hint: `needlebench study STUDY --shard K/N --resume` completes a shard and recomputes damaged cases"
             .to_owned(),
     );
     lines.join("\n")

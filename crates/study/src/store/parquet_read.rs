@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bytes::{Buf, Bytes};
-use needlebench_cell::open_input;
+use needlebench_input::open_input;
 use needlebench_kinematics::ik::Configuration;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
@@ -60,7 +60,7 @@ impl ParquetResults {
             pairs?.iter().find(|pair| pair.key == key)?.value.as_deref()
         };
         let version = get(VERSION_KEY).ok_or_else(|| {
-            fail("is a Parquet file, but no results of a study of needlebench".to_owned())
+            fail("is a Parquet file, but not the results of a needlebench study".to_owned())
         })?;
         if version != TABLE_VERSION.to_string() {
             return Err(fail(format!(
@@ -71,11 +71,13 @@ impl ParquetResults {
             get(SUM_KEY).ok_or_else(|| fail(format!("is damaged: it has no SHA-256\n{HEAL}")))?;
         let whole = seal::is_whole(&file, sum);
         if !whole.map_err(|error| fail(format!("cannot be read: {error}")))? {
-            return Err(fail(format!("is damaged: its SHA-256 is another\n{HEAL}")));
+            return Err(fail(format!(
+                "is damaged: its SHA-256 does not match\n{HEAL}"
+            )));
         }
         let need =
             |key: &str| get(key).ok_or_else(|| fail(format!("has no {key} in its metadata")));
-        let garbled = |key: &str| fail(format!("cannot be understood: {key} in its metadata"));
+        let garbled = |key: &str| fail(format!("has an unreadable {key} in its metadata"));
         let factors: Vec<Factor> =
             serde_json::from_str(need(FACTORS_KEY)?).map_err(|_| garbled(FACTORS_KEY))?;
         let cases: u64 = need(CASES_KEY)?.parse().map_err(|_| garbled(CASES_KEY))?;
@@ -185,17 +187,17 @@ impl ParquetResults {
                 .find(|(index, field)| found.get_fields().get(*index) != Some(field));
             return Err(match wrong {
                 Some((_, field)) if names.contains(&field.name()) => {
-                    format!("column {} is not where or what it should be", field.name())
+                    format!("column {} has the wrong place or type", field.name())
                 }
                 Some((_, field)) => format!("has no column {}", field.name()),
-                None => "has columns that this program does not know".to_owned(),
+                None => "has unknown columns".to_owned(),
             });
         }
         let groups = self.metadata.row_groups();
         let rows: u64 = groups.iter().map(rows_of).sum();
         if self.cases.checked_mul(ROWS as u64) != Some(rows) {
             return Err(format!(
-                "is not complete: it has {rows} rows, but {} cases need {ROWS} each",
+                "is incomplete: it has {rows} rows; {} cases require {ROWS} each",
                 self.cases
             ));
         }
@@ -220,7 +222,7 @@ impl ParquetResults {
         let part = self.part(&groups[index]);
         let part = part.map_err(|error| fail(format!("cannot be read: {error}")))?;
         if crc32fast::hash(&part.bytes) != self.checks[index] {
-            return Err(fail("is damaged: its CRC32 is another".to_owned()));
+            return Err(fail("is damaged: its CRC32 does not match".to_owned()));
         }
         let properties = ReaderProperties::builder().set_read_bloom_filter(false);
         let reader = SerializedRowGroupReader::new(
@@ -283,7 +285,7 @@ impl ParquetResults {
                     .zip(expected)
                     .any(|(number, case)| u64::try_from(*number) != Ok(case))
                 {
-                    return Err(bad("cases are not in their order"));
+                    return Err(bad("cases are not in order"));
                 }
             }
             (ColumnReader::DoubleColumnReader(reader), Content::Number(factor)) => {
@@ -341,7 +343,7 @@ impl ParquetResults {
                             .zip(expected)
                             .any(|(text, label)| text.data() != label.as_bytes())
                         {
-                            return Err(bad("configurations are not in their order"));
+                            return Err(bad("configurations are not in order"));
                         }
                     }
                     Content::Outcome => {
@@ -403,7 +405,7 @@ impl Results for ParquetResults {
 
 /// What to do about a damaged table.
 const HEAL: &str =
-    "hint: `needlebench study STUDY --resume` computes what is damaged again; or copy it again";
+    "hint: recompute damaged cases with `needlebench study STUDY --resume`, or copy the file again";
 
 /// Opens a file and reads its footer.
 fn metadata_of(path: &Path) -> Result<(File, ParquetMetaData), ResultsError> {
@@ -433,9 +435,9 @@ fn check_ends(file: &mut File) -> Result<(), String> {
     match ends.map(|end| end == MAGIC) {
         [true, true] => Ok(()),
         [true, false] => Err(format!(
-            "is cut off: it has {length} bytes and no end\n{HEAL}"
+            "is cut off: it has {length} bytes and no footer\n{HEAL}"
         )),
-        _ => Err("is no Parquet file".to_owned()),
+        _ => Err("is not a Parquet file".to_owned()),
     }
 }
 

@@ -8,21 +8,21 @@ use super::error::in_words;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[expect(missing_docs, reason = "fields are named in the messages")]
 pub enum Progress<'a> {
-    /// The journal ends within a record, as after a kill; its block is computed again.
+    /// The journal ends within a record, as after a kill; its block is recomputed.
     CutOff {
         journal: &'a Path,
         offset: u64,
         bytes: u64,
     },
-    /// Something else has changed the journal; what was there is computed again.
+    /// The journal is damaged; the damaged blocks are recomputed.
     Damage {
         journal: &'a Path,
         offset: u64,
         bytes: u64,
     },
-    /// A folder that says that it is complete is not: what is not sound is computed again.
+    /// A folder marked complete is damaged: damaged cases are recomputed.
     Unsound { file: &'a Path, reason: &'a str },
-    /// Below the folders that were given are some of studies of other names, which are left out.
+    /// The given folders contain studies of other names, which are skipped.
     OtherStudies { folders: &'a [PathBuf] },
     /// So many shards are looked through.
     Shards { done: u64, total: u64 },
@@ -49,7 +49,7 @@ impl std::fmt::Display for Progress<'_> {
                 bytes,
             } => write!(
                 f,
-                "{}: ends within a block; {bytes} bytes from byte {offset} on are cut off",
+                "{}: ends within a block; {bytes} bytes from byte {offset} on are discarded",
                 journal.display()
             ),
             Self::Damage {
@@ -58,24 +58,24 @@ impl std::fmt::Display for Progress<'_> {
                 bytes,
             } => write!(
                 f,
-                "{}: {bytes} bytes from byte {offset} on are damaged; what was there is computed again",
+                "{}: {bytes} bytes from byte {offset} on are damaged; their cases are recomputed",
                 journal.display()
             ),
             Self::Unsound { file, reason } => write!(
                 f,
-                "{}: {reason}; the study was complete, and what is not sound is computed again",
+                "{}: {reason}; the study was complete, damaged cases are recomputed",
                 file.display()
             ),
             Self::OtherStudies { folders } => write!(
                 f,
-                "left out, since they are of other studies: {}{}",
+                "skipped folders of other studies: {}{}",
                 folders[0].display(),
                 match folders.len() {
                     1 => String::new(),
-                    more => format!(" and {} more folders", more - 1),
+                    more => format!(" and {} more", more - 1),
                 }
             ),
-            Self::Shards { done, total } => write!(f, "{done} of {total} shards looked through"),
+            Self::Shards { done, total } => write!(f, "{done} of {total} shards scanned"),
             Self::Space {
                 journal_bytes,
                 table_bytes,
@@ -84,14 +84,14 @@ impl std::fmt::Display for Progress<'_> {
                 let [journals, table] = [*journal_bytes, *table_bytes].map(in_words);
                 write!(
                     f,
-                    "the table will take about {table} beside {journals} of journals"
+                    "the table requires about {table} in addition to {journals} of journals"
                 )?;
                 match free_bytes {
                     Some(free) => write!(f, "; {} are free", in_words(*free)),
                     None => Ok(()),
                 }
             }
-            Self::Begin { kept, total } => write!(f, "{kept} of {total} cases are there already"),
+            Self::Begin { kept, total } => write!(f, "{kept} of {total} cases already computed"),
             Self::Cases { done, total } => write!(f, "{done} of {total} cases"),
             Self::Table { done, total } => write!(f, "{done} of {total} cases in the table"),
         }

@@ -97,7 +97,7 @@ impl StudyRun<'_> {
         let manifest = &self.manifest;
         schema::check(&manifest.factors, &manifest.columns).map_err(StudyError::Request)?;
         if manifest.factors != self.design.factors() || manifest.cases != self.design.cases() {
-            let message = "the manifest is not that of the design";
+            let message = "the manifest does not match the design";
             return Err(StudyError::Request(message.to_owned()));
         }
         if manifest.block_cases == 0 {
@@ -109,7 +109,7 @@ impl StudyRun<'_> {
             .filter(|shard| u64::from(shard.parts()) > manifest.blocks())
         {
             return Err(StudyError::Request(format!(
-                "shard {shard}: the study has {} blocks of {} cases only\nhint: ask for fewer shards",
+                "shard {shard}: the study has only {} blocks of {} cases\nhint: use fewer shards",
                 manifest.blocks(),
                 manifest.block_cases
             )));

@@ -105,17 +105,14 @@ pub(crate) fn check(factors: &[Factor], metrics: &[MetricColumn]) -> Result<(), 
                 Content::Number(_) | Content::Label(_) => "factor",
                 _ => "metric",
             };
-            return Err(format!(
-                "{what} {}: there is a column of this name already",
-                column.name
-            ));
+            return Err(format!("{what} {}: duplicate column name", column.name));
         }
     }
     for factor in factors {
         let legal = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
         if factor.name.is_empty() || !factor.name.chars().all(legal) {
             return Err(format!(
-                "factor \"{}\": a name has letters, digits and _ only",
+                "factor \"{}\": names consist of letters, digits and _ only",
                 factor.name
             ));
         }
@@ -129,7 +126,7 @@ pub(crate) fn check(factors: &[Factor], metrics: &[MetricColumn]) -> Result<(), 
         for level in levels {
             if level.number.is_some_and(|number| !number.is_finite()) {
                 return Err(format!(
-                    "factor {}: {} is no number",
+                    "factor {}: {} is not a finite number",
                     factor.name, level.label
                 ));
             }
@@ -139,7 +136,10 @@ pub(crate) fn check(factors: &[Factor], metrics: &[MetricColumn]) -> Result<(), 
                 level.label.clone()
             };
             if !seen.insert(key) {
-                return Err(format!("factor {}: has {} twice", factor.name, level.label));
+                return Err(format!(
+                    "factor {}: {} is listed twice",
+                    factor.name, level.label
+                ));
             }
         }
     }
@@ -203,8 +203,8 @@ fn describe(content: Content, manifest: &Manifest) -> String {
         Content::Number(factor) | Content::Label(factor) => {
             let factor = &manifest.factors[factor];
             let role = match factor.role {
-                Role::Choice => "factor that is ours to choose",
-                Role::Circumstance => "factor that the results are to hold for",
+                Role::Choice => "control factor",
+                Role::Circumstance => "noise factor",
             };
             if factor.unit.is_empty() {
                 role.to_owned()
@@ -217,12 +217,12 @@ fn describe(content: Content, manifest: &Manifest) -> String {
             Configuration::ALL.map(Configuration::label).join(", ")
         ),
         Content::Outcome => {
-            "ok: works and meets all criteria; failed: works but misses the criterion in detail; \
-             rejected: breaks the rule in detail; invalid: the layout cannot exist"
+            "ok: feasible, all criteria met; failed: fails the criterion in detail; rejected: rejected by the rule \
+             in detail; not_judged: the criterion in detail could not be evaluated; invalid: invalid layout"
                 .to_owned()
         }
         Content::Detail => {
-            "rule or criterion that is broken, or the key at fault; empty if ok".to_owned()
+            "rule or criterion that fails, or the invalid key; empty if ok".to_owned()
         }
         Content::Metric(metric) => manifest.columns[metric].description.clone(),
     }

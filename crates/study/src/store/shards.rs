@@ -114,7 +114,7 @@ fn read(folder: &Path) -> Result<Manifest, StudyError> {
     Manifest::read(folder)?.ok_or_else(|| {
         StudyError::file(
             folder,
-            "holds no study\nhint: give the folders of its shards, or one that they are in",
+            "holds no study\nhint: give the folders of its shards, or their parent folder",
         )
     })
 }

@@ -1,4 +1,4 @@
-//! Room on a disk, asked for before a table of gigabytes is begun.
+//! Free disk space, checked before a table of gigabytes is begun.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::FactorKind;
 
 /// Bytes that a table takes at most, as far as one can tell from those that its blocks have in journals.
 ///
-/// A journal compresses less: blocks of at most 64 cases, at a lower level. Only numbers that are drawn are
+/// A journal compresses less: blocks of at most 64 cases, at a lower level. Only numbers that are sampled are
 /// longer in a table, which has them once a row; and every row group describes its columns.
 pub(crate) fn table_bytes(manifest: &Manifest, journal_bytes: u64) -> u64 {
     /// Value, its index and the index's repetition.
@@ -50,7 +50,7 @@ fn free(_: &Path) -> Option<u64> {
 }
 
 /// # Errors
-/// [`StudyError::Space`] if there is less room than needed.
+/// [`StudyError::Space`] if there is less free space than needed.
 pub(crate) fn check(folder: &Path, needed: u64, free: Option<u64>) -> Result<(), StudyError> {
     match free {
         Some(free) if free < needed => Err(StudyError::Space {
@@ -91,7 +91,7 @@ mod tests {
         assert!(!error.is_input());
         assert_eq!(
             error.to_string(),
-            "out: the table will take about 7.01 GB, and 91.2 MB are free\n\
+            "out: the table requires about 7.01 GB, 91.2 MB are free\n\
              hint: free some space, or choose another folder; nothing was written"
         );
     }

@@ -16,7 +16,7 @@ pub enum ShardState {
     Done,
     /// A process writes to it.
     Running,
-    /// It was begun, and nobody writes to it.
+    /// It was begun, and no process writes to it.
     Stopped,
 }
 
@@ -51,9 +51,9 @@ pub struct Survey {
     pub parts: Option<u32>,
     /// Other numbers of parts, and how many folders there are of each.
     pub mixed: BTreeMap<u32, usize>,
-    /// Parts of `parts` whose cases are not all there and that nobody writes to, in order.
+    /// Parts of `parts` whose cases are not all there and that no process writes to, in order.
     pub missing: Vec<u32>,
-    /// Parts of `parts` whose cases are not all there and that somebody writes to, in order.
+    /// Parts of `parts` whose cases are not all there and that a process writes to, in order.
     pub running: Vec<u32>,
     /// Folders that are of studies of other names.
     pub others: Vec<PathBuf>,

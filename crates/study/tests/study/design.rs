@@ -1,9 +1,9 @@
 //! A design gives every case its values, from the number of the case alone.
 
-use needlebench_cell::study::{
+use needlebench_scenario::study::{
     Distribution, FactorValues, Role, SamplingMethod, StudyFactor, StudyLevel,
 };
-use needlebench_cell::{Change, KeyPath, Setting};
+use needlebench_scenario::{Change, KeyPath, Setting};
 use needlebench_study::{Design, DesignError, Factor, FactorValue};
 
 fn key() -> KeyPath {

@@ -101,7 +101,7 @@ fn a_cancelled_run_says_how_far_it_came_and_goes_on_from_there() {
     assert_eq!(files(folder.path()), [JOURNAL_FILE, MANIFEST_FILE]);
     let (blocks, lines) = resume(folder.path());
     assert_eq!(blocks, (20..BLOCKS).collect::<Vec<_>>());
-    assert_eq!(lines[0], "160 of 400 cases are there already");
+    assert_eq!(lines[0], "160 of 400 cases already computed");
     assert!(tables(folder.path()) == expected());
 }
 
@@ -219,7 +219,7 @@ fn a_tail_of_garbage_is_cut_off() {
     std::fs::write(&path, &journal).unwrap();
     let (blocks, said) = resume(folder.path());
     assert_eq!(blocks, (20..BLOCKS).collect::<Vec<_>>());
-    let line = format!("ends within a block; 52 bytes from byte {end} on are cut off");
+    let line = format!("ends within a block; 52 bytes from byte {end} on are discarded");
     assert!(said[0].ends_with(&line), "{said:?}");
 }
 
@@ -249,7 +249,7 @@ fn a_full_disk_damages_nothing() {
     assert!(text.contains("journal.nbj: File too large"), "{text}");
     let (blocks, lines) = resume(folder.path());
     // Nothing to be cut off: the half of a record was taken back.
-    assert_eq!(lines[0], format!("{kept} of 400 cases are there already"));
+    assert_eq!(lines[0], format!("{kept} of 400 cases already computed"));
     assert_eq!(blocks.len() as u64, BLOCKS - kept / u64::from(BLOCK));
     assert!(tables(folder.path()) == expected());
 }

@@ -43,12 +43,12 @@ fn missing_shards_are_listed() {
     assert_eq!(
         refused(place, &folders),
         "48 of 100 cases are missing\n  \
-         shard 2/4 is not among the folders\n  \
-         shard 4/4 is not among the folders\n\
-         hint: `needlebench study STUDY --shard K/N --resume` finishes a shard, and \
-          computes what is damaged again"
+         shard 2/4 has no folder\n  \
+         shard 4/4 has no folder\n\
+         hint: `needlebench study STUDY --shard K/N --resume` completes a shard and \
+          recomputes damaged cases"
     );
-    assert_eq!(refused(place, &[]), "there is nothing to merge");
+    assert_eq!(refused(place, &[]), "nothing to merge");
     let text = refused(place, &[place.join("nowhere")]);
     assert!(text.starts_with("/nowhere: holds no study"), "{text}");
 }
@@ -64,9 +64,9 @@ fn a_shard_that_is_not_complete_is_named() {
     assert_eq!(
         refused(place, &folders),
         "8 of 100 cases are missing\n  \
-         /2of2: shard 2/2 was complete and is damaged\n\
-         hint: `needlebench study STUDY --shard K/N --resume` finishes a shard, and \
-          computes what is damaged again"
+         /2of2: shard 2/2 is damaged\n\
+         hint: `needlebench study STUDY --shard K/N --resume` completes a shard and \
+          recomputes damaged cases"
     );
 }
 
@@ -127,8 +127,7 @@ fn shards_that_contradict_each_other_are_refused() {
     let text = refused(place, &[one, other]);
     assert_eq!(
         text,
-        "/1of2 and /other contradict each other in cases 0 to 7: one of them was not computed by this \
-         program"
+        "/1of2 and /other differ in cases 0 to 7: one of them was not computed by this program"
     );
 }
 
@@ -210,7 +209,7 @@ fn shards_are_found_below_a_folder_and_results_beside_them_are_none() {
     assert_eq!(
         said,
         [format!(
-            "left out, since they are of other studies: {}",
+            "skipped folders of other studies: {}",
             other.display()
         )]
     );
@@ -264,7 +263,7 @@ fn many_missing_shards_are_a_list_and_not_a_page() {
     let text = refused(place, &folders);
     assert_eq!(
         text.lines().nth(1).unwrap(),
-        "  298 shards of 300 are not among the folders: 1,2,4-16,18-300"
+        "  298 shards of 300 have no folder: 1,2,4-16,18-300"
     );
     assert_eq!(text.lines().count(), 3);
 }

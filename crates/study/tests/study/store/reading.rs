@@ -107,10 +107,7 @@ fn a_table_describes_its_columns() {
     for name in names {
         assert!(described[name].is_string(), "{name}");
     }
-    assert_eq!(
-        described["tilt_deg"],
-        "factor that the results are to hold for, deg"
-    );
+    assert_eq!(described["tilt_deg"], "noise factor, deg");
     let provenance: serde_json::Value =
         serde_json::from_str(&get("needlebench.provenance")).unwrap();
     assert_eq!(provenance["program"]["name"], "needlebench");
@@ -152,10 +149,10 @@ fn a_table_and_its_csv_have_the_same_cells() {
 #[test]
 fn files_that_are_no_tables_are_told_apart() {
     assert_eq!(refused(b""), "is empty");
-    assert_eq!(refused(b"PAR1"), "is no Parquet file");
+    assert_eq!(refused(b"PAR1"), "is not a Parquet file");
     assert_eq!(
         refused(b"case,goal,outcome\n0,a,ok\n"),
-        "is no Parquet file"
+        "is not a Parquet file"
     );
     let missing = read(Path::new("no/such/file")).unwrap_err().to_string();
     assert!(
@@ -180,7 +177,7 @@ fn a_foreign_parquet_file_is_refused() {
     let bytes = writer.into_inner().unwrap();
     assert_eq!(
         refused(&bytes),
-        "is a Parquet file, but no results of a study of needlebench"
+        "is a Parquet file, but not the results of a needlebench study"
     );
 }
 
@@ -190,7 +187,7 @@ fn a_table_cut_off_anywhere_is_refused() {
     for part in 1..20 {
         let end = bytes.len() * part / 20;
         let message = refused(&bytes[..end]);
-        let expected = format!("is cut off: it has {end} bytes and no end");
+        let expected = format!("is cut off: it has {end} bytes and no footer");
         assert!(message.starts_with(&expected), "{message}");
     }
     let message = refused(&bytes[..bytes.len() - 1]);

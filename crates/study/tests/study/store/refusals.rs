@@ -41,8 +41,8 @@ fn results_are_never_overwritten() {
     let before = std::fs::read(folder.path().join(RESULTS_FILE)).unwrap();
     assert_eq!(
         refused(&Request::new(CASES, BLOCK), folder.path()),
-        "FOLDER: holds this study, complete, already\n\
-         hint: --resume continues it; or choose another folder"
+        "FOLDER: already holds this study (complete)\n\
+         hint: continue with --resume, or choose another folder"
     );
     std::fs::remove_file(folder.path().join(MANIFEST_FILE)).unwrap();
     let text = refused(&Request::new(CASES, BLOCK), folder.path());
@@ -108,12 +108,12 @@ fn every_shard_has_a_folder_of_its_own() {
     shard(1, 3).run(folder.path()).unwrap();
     assert_eq!(
         refused(&shard(2, 3), folder.path()),
-        "FOLDER/study.json: is of shard 1/3 of this study, not of shard 2/3\n\
-         hint: every shard needs a folder of its own"
+        "FOLDER/study.json: holds shard 1/3 of this study, not shard 2/3\n\
+         hint: every shard requires its own folder"
     );
     assert_eq!(
         refused(&shard(1, 6), tempfile::tempdir().unwrap().path()),
-        "shard 1/6: the study has 5 blocks of 8 cases only\nhint: ask for fewer shards"
+        "shard 1/6: the study has only 5 blocks of 8 cases\nhint: use fewer shards"
     );
 }
 
@@ -160,9 +160,9 @@ fn a_garbled_manifest_and_one_of_the_future_are_refused() {
     for (text, message) in [
         (
             "{",
-            "FOLDER/study.json: is no manifest of a study: EOF while parsing",
+            "FOLDER/study.json: is not a study manifest: EOF while parsing",
         ),
-        ("[]", "FOLDER/study.json: is no manifest of a study: "),
+        ("[]", "FOLDER/study.json: is not a study manifest: "),
         (
             "{\"schema_version\": 3, \"surprise\": true}",
             "FOLDER/study.json: has schema version 3; this program reads version 2",
@@ -190,7 +190,7 @@ fn workers_that_cannot_begin_say_why() {
     };
     assert_eq!(
         refused(&request, tempfile::tempdir().unwrap().path()),
-        "no worker could be started: MuJoCo is not installed"
+        "cannot start a worker: MuJoCo is not installed"
     );
 }
 
@@ -227,31 +227,31 @@ fn factors_that_make_no_table_are_refused() {
     for (factors, message) in [
         (
             vec![factor("outcome", &one)],
-            "factor outcome: there is a column of this name already",
+            "factor outcome: duplicate column name",
         ),
         (
             vec![factor("clearance_static_mm", &one)],
-            "factor clearance_static_mm: there is a column of this name already",
+            "factor clearance_static_mm: duplicate column name",
         ),
         (vec![factor("goal", &[])], "factor goal: has no levels"),
         (
             vec![factor("goal x", &one)],
-            "factor \"goal x\": a name has letters, digits and _ only",
+            "factor \"goal x\": names consist of letters, digits and _ only",
         ),
         (
             vec![factor("goal", &[level("a", None), level("a", Some(1.0))])],
-            "factor goal: has a twice",
+            "factor goal: a is listed twice",
         ),
         (
             vec![factor(
                 "goal",
                 &[level("0", Some(0.0)), level("-0", Some(-0.0))],
             )],
-            "factor goal: has -0 twice",
+            "factor goal: -0 is listed twice",
         ),
         (
             vec![factor("goal", &[level("x", Some(f64::NAN))])],
-            "factor goal: x is no number",
+            "factor goal: x is not a finite number",
         ),
     ] {
         let design = Odd(factors);

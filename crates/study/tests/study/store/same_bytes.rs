@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use needlebench_study::{
     JOURNAL_FILE, MANIFEST_FILE, Manifest, RESULTS_FILE, RunEnd, Shard, Status, StudyRun, merge,
 };
@@ -130,7 +130,7 @@ fn twenty_kills_at_random_moments_lose_nothing() {
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
         let begin = lines.find_map(|line| {
             let line = line.unwrap();
-            line.split_once(" of 2000 cases are there")
+            line.split_once(" of 2000 cases already computed")
                 .map(|(count, _)| {
                     let count = count.rsplit(' ').next().unwrap();
                     count.parse::<u64>().unwrap()

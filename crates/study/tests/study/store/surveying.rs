@@ -31,8 +31,15 @@ fn shards_done_stopped_and_missing_are_told_apart() {
     for part in [1, 2, 4] {
         shard(place, part, 5);
     }
-    let journal = shard(place, 3, 5).join(JOURNAL_FILE);
-    // A kill in the middle of a block.
+    // Of one thread, so that the journal has its blocks in their order and not as they were finished.
+    let request = Request {
+        shard: Shard::new(3, 5),
+        threads: 1,
+        ..Request::new(CASES, BLOCK)
+    };
+    request.run(&place.join("3/synthetic")).unwrap();
+    let journal = place.join("3/synthetic").join(JOURNAL_FILE);
+    // A kill in the middle of the last block.
     let stopped = place.join("3/synthetic/study.json");
     let text = std::fs::read_to_string(&stopped).unwrap();
     std::fs::write(&stopped, text.replace("complete", "running")).unwrap();
@@ -57,12 +64,11 @@ fn shards_done_stopped_and_missing_are_told_apart() {
     shard(place, 5, 5);
     assert_eq!(surveyed(place, None).missing, [3]);
     // Nobody was kept out, and it goes on.
-    let request = Request {
-        shard: Shard::new(3, 5),
+    let resumed = Request {
         resume: true,
-        ..Request::new(CASES, BLOCK)
+        ..request
     };
-    request.run(&place.join("3/synthetic")).unwrap();
+    resumed.run(&place.join("3/synthetic")).unwrap();
     let found = surveyed(place, None);
     assert!(found.is_complete() && found.missing.is_empty());
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use needlebench_study::{
     CaseDesign, CaseError, CaseEvaluator, CaseResult, CaseWorker, Factor, FactorKind, FactorValue,
     Level, Manifest, MetricColumn, Outcome, Role, Row,
