@@ -1,30 +1,29 @@
-//! The atlas as a table.
+//! The roll map as a table.
 
 use std::fmt::Write;
 
 use needlebench_bench::GoalAtlas;
-use needlebench_cell::{Cell, Goal, Roll, rule_in_words};
+use needlebench_cell::{Cell, rule_in_words};
 use needlebench_kinematics::ik::Configuration;
 use needlebench_planning::{Aim, Edge, Member, RollRange};
-
-use super::plain_table;
+use needlebench_scenario::{Goal, Roll};
+use needlebench_show::plain_table;
 
 /// A goal's ranges, with the best roll of each.
 ///
-/// `wide` adds what ends a range, the margins of its best roll, and the configurations that work nowhere as rows of
-/// the table.
+/// `wide` adds what ends a range, the margins of its best roll, and the infeasible configurations as rows of the table.
 pub fn text(cell: &Cell, goal: &Goal, atlas: &GoalAtlas, wide: bool) -> String {
     let mut header = vec![
         "configuration",
-        "works\n(deg)",
+        "feasible\n(deg)",
         "best roll\n(deg)",
-        "nearest\n(mm)",
+        "minimum\nclearance\n(mm)",
         "between",
     ];
     if wide {
         header.extend([
-            "before it",
-            "after it",
+            "rejected\nbefore",
+            "rejected\nafter",
             "joint\nmargin",
             "|sin q5|",
             "|sin q3|",
@@ -37,7 +36,7 @@ pub fn text(cell: &Cell, goal: &Goal, atlas: &GoalAtlas, wide: bool) -> String {
         if family.ranges.is_empty() {
             table.add_row([
                 label.clone(),
-                "nowhere".to_owned(),
+                "none".to_owned(),
                 String::new(),
                 String::new(),
                 nearest_miss(atlas, family.configuration),
@@ -50,13 +49,16 @@ pub fn text(cell: &Cell, goal: &Goal, atlas: &GoalAtlas, wide: bool) -> String {
         }
     }
     let fixed = match goal.roll {
-        Roll::Fixed(roll_rad) => format!("; the goal fixes {:.1} deg", roll_rad.to_degrees()),
+        Roll::Fixed(roll_rad) => format!(
+            "; the goal fixes the roll at {:.1} deg",
+            roll_rad.to_degrees()
+        ),
         Roll::Free => String::new(),
     };
     let mut text = format!("goal {}: {}", goal.name, answer(atlas));
     let _ = write!(
         text,
-        "\n{} rolls of the guide about the needle; the best roll is best for {}{fixed}\n{table}",
+        "\n{} roll angles of the guide about the needle; best roll by {}{fixed}\n{table}",
         atlas.rolls_rad.len(),
         aim_in_words(atlas.aim),
     );
@@ -67,7 +69,7 @@ pub fn text(cell: &Cell, goal: &Goal, atlas: &GoalAtlas, wide: bool) -> String {
     for family in nowhere {
         let _ = write!(
             text,
-            "\nnowhere: {} ({})",
+            "\ninfeasible at any roll: {} ({})",
             family.configuration.label(),
             nearest_miss(atlas, family.configuration)
         );
@@ -75,7 +77,7 @@ pub fn text(cell: &Cell, goal: &Goal, atlas: &GoalAtlas, wide: bool) -> String {
     text
 }
 
-/// How many configurations work at some roll, and which has most rolls.
+/// How many configurations are feasible at some roll, and which has the widest range.
 fn answer(atlas: &GoalAtlas) -> String {
     let working = atlas
         .families
@@ -88,13 +90,13 @@ fn answer(atlas: &GoalAtlas) -> String {
         .max_by(|a, b| width_rad(&a.ranges).total_cmp(&width_rad(&b.ranges)));
     let freest = freest.map_or(String::new(), |family| {
         format!(
-            "; {} has most room to turn, {:.0} of 360 deg",
+            "; {} has the widest range, {:.0} of 360 deg",
             family.configuration.label(),
             width_rad(&family.ranges).to_degrees()
         )
     });
     format!(
-        "{count} of {} configurations work{freest}",
+        "{count} of {} configurations feasible{freest}",
         atlas.families.len()
     )
 }
@@ -108,10 +110,10 @@ fn width_rad(ranges: &[RollRange]) -> f64 {
 fn aim_in_words(aim: Aim) -> &'static str {
     match aim {
         Aim::Clearance => "clearance",
-        Aim::JointMargin => "distance from the joint limits",
-        Aim::Singularity => "distance from singularities",
-        Aim::TipAccuracy => "accuracy of the tip",
-        Aim::Balanced => "all aims together",
+        Aim::JointMargin => "joint-limit margin",
+        Aim::Singularity => "singularity margin",
+        Aim::TipAccuracy => "tip accuracy",
+        Aim::Balanced => "all aims combined",
     }
 }
 
@@ -127,7 +129,7 @@ fn row(cell: &Cell, atlas: &GoalAtlas, label: String, range: &RollRange) -> Vec<
     let margins = best.candidate.as_ref().map(|candidate| candidate.margins);
     let margin = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.2}"));
     let works = if range.is_whole_circle {
-        "all round".to_owned()
+        "all angles".to_owned()
     } else {
         format!("{} to {}", degrees(range.from_rad), degrees(range.to_rad))
     };
@@ -150,7 +152,7 @@ fn row(cell: &Cell, atlas: &GoalAtlas, label: String, range: &RollRange) -> Vec<
     ]
 }
 
-/// Why a configuration works nowhere: the rule of the roll that comes nearest to working.
+/// Why a configuration is infeasible at any roll: the rule of the roll with the largest constraint margin.
 fn nearest_miss(atlas: &GoalAtlas, configuration: Configuration) -> String {
     atlas.members[configuration.index()]
         .iter()

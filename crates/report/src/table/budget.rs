@@ -3,10 +3,8 @@
 use std::fmt::Write;
 
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
+use needlebench_show::{layout, plain_table};
 use needlebench_uncertainty::budget::{ErrorBudget, SourceBudget};
-
-use super::plain_table;
-use crate::layout;
 
 /// Mean of the largest errors that 153 interventional radiologists allow, m.
 pub(crate) const ALLOWED_M: f64 = 2.7e-3;
@@ -30,7 +28,7 @@ pub(crate) fn mm(metres: f64) -> String {
     format!("{:.2}", metres * 1e3)
 }
 
-/// Budgets as a table with what follows from them; none without imperfections.
+/// Budgets as a table with remarks; none without imperfections.
 pub(crate) fn budget_text(goal: &GoalReport) -> Option<String> {
     let budgets = budgets(goal);
     let (_, first) = budgets.first()?;
@@ -39,16 +37,16 @@ pub(crate) fn budget_text(goal: &GoalReport) -> Option<String> {
     header.extend(named.map(|words| layout::in_lines(words, 13)));
     header.extend(
         [
-            "all",
-            "all:\nacross",
-            "all:\nbias",
-            "all:\nspread",
-            "all:\nat skin",
-            "95 %\nwithin",
+            "total",
+            "total:\nlateral",
+            "total:\nbias",
+            "total:\nspread",
+            "total:\nat skin",
+            "P95",
         ]
         .map(str::to_owned),
     );
-    header.push("ways differ\nspread, bias".to_owned());
+    header.push("difference\nspread, bias".to_owned());
     let mut table = plain_table(&header.iter().map(String::as_str).collect::<Vec<_>>());
     for (configuration, budget) in &budgets {
         let mut row = vec![configuration.label.to_owned()];
@@ -70,12 +68,13 @@ pub(crate) fn budget_text(goal: &GoalReport) -> Option<String> {
         table.add_row(row);
     }
     for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(comfy_table::CellAlignment::Right);
+        column.set_cell_alignment(needlebench_show::CellAlignment::Right);
     }
     let mut text = format!(
-        "error budget of the needle's tip over all arms and patients (mm, root mean square; by Jacobians{})\n{table}\n",
+        "error budget of the needle tip over the arm and patient population (mm, RMS; from \
+         Jacobians{})\n{table}\n",
         if first.samples > 0 {
-            format!(", against {} draws", first.samples)
+            format!(", compared with {} draws", first.samples)
         } else {
             String::new()
         }
@@ -85,7 +84,7 @@ pub(crate) fn budget_text(goal: &GoalReport) -> Option<String> {
     Some(text)
 }
 
-/// The worst differences of the two ways over all sources: covariance in per cent, bias in um.
+/// The largest differences between Jacobians and draws over all sources: covariance in per cent, bias in um.
 fn largest_difference(budget: &ErrorBudget) -> String {
     let all = || budget.sources.iter().chain([&budget.total]);
     let points = || all().flat_map(|each| [each.at_skin, each.at_target]);
@@ -118,7 +117,7 @@ fn write_remarks(
         let dominant = budget.dominant_in_words().unwrap_or("nothing");
         writeln!(
             out,
-            "least off of those that work: {}, {} mm, most of it by {dominant}",
+            "smallest RMS tip error of the feasible configurations: {}, {} mm, main source {dominant}",
             configuration.label,
             mm(rms(budget))
         )?;
@@ -138,7 +137,7 @@ fn write_remarks(
                 if high > 1.2 * low && high > 0.1e-3 {
                     writeln!(
                         out,
-                        "to {}: least sensitive {} ({} mm), most {} ({} mm)",
+                        "{}: least sensitive {} ({} mm), most sensitive {} ({} mm)",
                         own.in_words(),
                         least.0.label,
                         mm(low),
@@ -160,7 +159,7 @@ fn write_remarks(
             {
                 writeln!(
                     out,
-                    "{}: {engine} leaves the tip {} mm from where the balance of torques has it",
+                    "{}: tip in {engine} deviates {} mm from static equilibrium",
                     configuration.label,
                     mm(off_m)
                 )?;
@@ -170,5 +169,5 @@ fn write_remarks(
     Ok(())
 }
 
-/// Distance from the prediction that is worth a line, m.
+/// Distance from the prediction above which a line is printed, m.
 const UNEXPLAINED_M: f64 = 0.1e-3;

@@ -1,13 +1,12 @@
 //! Two results side by side.
 
-use comfy_table::{Cell, CellAlignment, Color};
 use needlebench_evaluation::compare::{
     Change, Comparison, ComparisonFailure, ConfigurationComparison, GoalComparison,
     MetricComparison, Side,
 };
+use needlebench_show::{Cell, CellAlignment, Color, Table, plain_table};
 
 use super::verdict::capitals;
-use super::{Table, plain_table};
 
 fn change_text(change: Change) -> &'static str {
     match change {
@@ -115,8 +114,8 @@ pub(crate) fn metric_texts(found: &MetricComparison) -> [String; 5] {
     ]
 }
 
-/// Metrics worth a row: of configurations that work in either result, those that changed and say most
-/// of what they are about, or all.
+/// Metrics worth a row: of feasible configurations in either result, those that changed and say most of what they are
+/// about, or all.
 pub(crate) fn rows(
     goal: &GoalComparison,
     all: bool,
@@ -144,11 +143,11 @@ pub(crate) fn unchanged(goal: &GoalComparison) -> usize {
     rows(goal, true).iter().filter(|row| same(row)).count()
 }
 
-/// Losses that one screen lists, and metrics; of more the number is said.
+/// Regressions that one screen lists, and metrics; of more, the number is printed.
 const MOST_LISTED: usize = 8;
 const MOST_METRICS: usize = 12;
 
-/// The comparison in one screen: verdict, losses, what became of each goal, and of each metric how many
+/// The comparison in one screen: verdict, regressions, the outcome of each goal, and of each metric how many
 /// configurations are better or worse by it.
 pub fn comparison_screen(comparison: &Comparison) -> String {
     let mut lines = vec![verdict(comparison)];
@@ -169,7 +168,7 @@ pub fn comparison_screen(comparison: &Comparison) -> String {
     if !judged.is_empty() {
         lines.push(String::new());
         lines.push(
-            "of configurations that moved in both, by metrics that are judged or ranked by"
+            "configurations with a motion in A and B; metrics used by criteria or ranking"
                 .to_owned(),
         );
         lines.push(metrics_table(&judged).to_string());
@@ -177,7 +176,7 @@ pub fn comparison_screen(comparison: &Comparison) -> String {
     let more = others.len() + judged.len().saturating_sub(MOST_METRICS);
     if more > 0 {
         lines.push(format!(
-            "{more} more metrics changed; each configuration by itself: --wide"
+            "{more} more metrics changed; --wide prints each configuration separately"
         ));
     } else if judged.is_empty() {
         lines.push("no value changed beyond its resolution".to_owned());
@@ -185,7 +184,7 @@ pub fn comparison_screen(comparison: &Comparison) -> String {
     lines.join("\n")
 }
 
-/// A loss in one screen: what it is, without what may mend it.
+/// A regression in one screen, without its hint.
 fn failure_line(failure: &ComparisonFailure) -> String {
     let text = failure_text(failure);
     match text.split_once("; ") {
@@ -195,7 +194,7 @@ fn failure_line(failure: &ComparisonFailure) -> String {
     }
 }
 
-/// Metrics that changed of configurations that moved in both results, whether or not they met the criteria: others have nothing to compare.
+/// Metrics that changed of configurations with a motion in both results, whether or not they meet the criteria.
 fn changed_rows(goal: &GoalComparison) -> Vec<(&ConfigurationComparison, &MetricComparison)> {
     let moved = |status: &Option<String>| status.as_deref().is_some_and(|it| it != "rejected");
     let mut changed = rows(goal, false);
@@ -203,7 +202,7 @@ fn changed_rows(goal: &GoalComparison) -> Vec<(&ConfigurationComparison, &Metric
     changed
 }
 
-/// Whether people judge or rank by a metric.
+/// Whether criteria or the ranking use a metric.
 fn is_judged(found: &MetricComparison) -> bool {
     let metric = found.key.metric();
     !found.key.is_of_engine() && (metric.ranking_key.is_some() || metric.criterion.is_some())
@@ -217,11 +216,11 @@ fn has_news(goal: &GoalComparison) -> bool {
         || !rows(goal, false).is_empty()
 }
 
-/// How many configurations work, which is recommended, and how many values changed.
+/// How many configurations are feasible, which is recommended, and how many values changed.
 fn goals_table(goals: &[&GoalComparison]) -> Table {
     let mut table = plain_table(&[
         "goal",
-        "work\nA to B",
+        "feasible\nA to B",
         "recommended\nA to B",
         "values\nbetter",
         "\nworse",
@@ -324,7 +323,7 @@ fn metric_changes<'a>(goals: &[&'a GoalComparison]) -> Vec<MetricChanges<'a>> {
             }
         }
     }
-    // What got worse most often comes first; the order of the table of metrics breaks ties.
+    // The metric that is worse most often comes first; the order of the table of metrics breaks ties.
     all.sort_by_key(|each| std::cmp::Reverse((each.worse, each.better)));
     all
 }
@@ -339,7 +338,7 @@ fn metrics_table(metrics: &[MetricChanges<'_>]) -> Table {
                 let [_, a, b, change, _] = metric_texts(found);
                 // Below the digits that both are shown with.
                 let from_to = if a == b {
-                    format!("{a}, by {change}")
+                    format!("{a}, change {change}")
                 } else {
                     format!("{a} to {b}")
                 };
@@ -361,7 +360,7 @@ fn metrics_table(metrics: &[MetricChanges<'_>]) -> Table {
     table
 }
 
-/// The two results, what else differs between them, and notes.
+/// The two results, other differences between them, and notes.
 fn sides(comparison: &Comparison) -> Vec<String> {
     let mut lines = vec![side_text("A", &comparison.a), side_text("B", &comparison.b)];
     for difference in &comparison.provenance_differences {
@@ -416,7 +415,7 @@ pub fn comparison_text(comparison: &Comparison, all: bool) -> String {
             lines.push(table.to_string());
         }
         if !all && goal.a.is_some() && goal.b.is_some() {
-            lines.push(format!("{} values are the same", unchanged(goal)));
+            lines.push(format!("{} values are unchanged", unchanged(goal)));
         }
     }
     lines.push(String::new());
@@ -427,7 +426,7 @@ pub fn comparison_text(comparison: &Comparison, all: bool) -> String {
     lines.join("\n")
 }
 
-/// The verdict in a line: what was compared, what was lost, what changed.
+/// The verdict in a line: what was compared, regressions, changes.
 pub(crate) fn verdict(comparison: &Comparison) -> String {
     let count = |way: &[Change]| {
         let rows = comparison.goals.iter().flat_map(changed_rows);
@@ -441,12 +440,13 @@ pub(crate) fn verdict(comparison: &Comparison) -> String {
         .map(|goal| goal.configurations.len())
         .sum();
     let losses = match comparison.failures.len() {
-        0 => "nothing was lost beyond what is allowed".to_owned(),
-        1 => "1 loss".to_owned(),
-        count => format!("{count} losses"),
+        0 => "no regression beyond the thresholds".to_owned(),
+        1 => "1 regression".to_owned(),
+        count => format!("{count} regressions"),
     };
     let mut text = format!(
-        "{}: {losses}; {goals} {}, {configurations} configurations; of those that moved in both {} values are better, {} worse",
+        "{}: {losses} ({goals} {}, {configurations} configurations; with a motion in A and B: {} \
+         values better, {} worse)",
         capitals(comparison.verdict),
         if goals == 1 { "goal" } else { "goals" },
         count(&[Change::Better, Change::New]),

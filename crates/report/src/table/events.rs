@@ -1,15 +1,13 @@
-//! Contacts, stops and ways back as tables.
+//! Contacts, stops and retreats as tables.
 
 use std::fmt::Write;
 
-use comfy_table::{Cell, CellAlignment};
 use needlebench_evaluation::events::{PressEngineReport, RIGID_FORCE_MEANS};
 use needlebench_evaluation::report::GoalReport;
+use needlebench_show::number::{millimetres, percent_with, small_length};
+use needlebench_show::{Cell, CellAlignment, Table, plain_table};
 
-use super::{Table, plain_table};
-use crate::number::{millimetres, percent_with, small_length};
-
-/// What the events of a goal's configurations measured; none where none were asked for.
+/// Results of the events of a goal's configurations; none where none are prescribed.
 pub(crate) fn events_text(goal: &GoalReport) -> Option<String> {
     goal.configurations
         .iter()
@@ -17,11 +15,11 @@ pub(crate) fn events_text(goal: &GoalReport) -> Option<String> {
     let mut text = String::new();
     let tables = [
         (
-            format!("contacts that were asked for; forces: {RIGID_FORCE_MEANS}"),
+            format!("prescribed contacts; forces: {RIGID_FORCE_MEANS}"),
             press_table(goal),
         ),
         ("emergency stop".to_owned(), stop_table(goal)),
-        ("way back along the needle".to_owned(), retract_table(goal)),
+        ("retreat along the needle".to_owned(), retract_table(goal)),
     ];
     for (heading, table) in tables {
         if table.row_count() > 0 {
@@ -54,11 +52,11 @@ pub(crate) fn events_in_words(goal: &GoalReport) -> Option<String> {
             count => format!(" ({count} more could not be staged)"),
         };
         parts.push(format!(
-            "{staged} contacts that were asked for{left_out}, at most {force:.1} N against a rigid surface"
+            "{staged} prescribed contacts{left_out}, peak force {force:.1} N (rigid surface)"
         ));
     } else if left_out > 0 {
         parts.push(format!(
-            "none of {left_out} contacts that were asked for could be staged"
+            "none of {left_out} prescribed contacts could be staged"
         ));
     }
     let measured = || stops().flat_map(|each| each.engines.values());
@@ -66,7 +64,7 @@ pub(crate) fn events_in_words(goal: &GoalReport) -> Option<String> {
         let time = largest(&mut measured().filter_map(|each| each.stopping_time_s));
         let time = time.map_or(String::new(), |s| format!(" in {:.0} ms", s * 1e3));
         parts.push(format!(
-            "in an emergency stop the tip goes {:.1} mm at most{time}",
+            "emergency stop: tip travels at most {:.1} mm{time}",
             way_m * 1e3
         ));
     }
@@ -74,15 +72,15 @@ pub(crate) fn events_in_words(goal: &GoalReport) -> Option<String> {
     if let Some(off_m) = largest(&mut ways().map(|each| each.largest_lateral_deviation_m)) {
         let touching = ways().filter(|each| !each.contacts.is_empty()).count();
         let touching = match touching {
-            0 => "touches nothing".to_owned(),
-            count => format!("touches something in {count} of {}", ways().count()),
+            0 => "no contact".to_owned(),
+            count => format!("contact in {count} of {}", ways().count()),
         };
         parts.push(format!(
-            "the way back leaves the axis by {} at most and {touching}",
+            "retreat: at most {} off axis, {touching}",
             small_length(off_m)
         ));
     }
-    (!parts.is_empty()).then(|| format!("events, worst of all: {}", parts.join("; ")))
+    (!parts.is_empty()).then(|| format!("events, worst case: {}", parts.join("; ")))
 }
 
 fn add(table: &mut Table, row: Vec<String>, texts: usize) {
@@ -104,19 +102,19 @@ fn or_dash(value: Option<f64>, text: impl Fn(f64) -> String) -> String {
 fn press_table(goal: &GoalReport) -> Table {
     let mut table = plain_table(&[
         "configuration",
-        "touching",
+        "contact",
         "friction",
         "engine",
         "onset\n(s)",
-        "at\n(mm/s)",
-        "rigid\npeak (N)",
-        "servo on\nrigid (N)",
+        "impact\n(mm/s)",
+        "peak\nforce (N)",
+        "settled\nforce (N)",
         "impulse\n(N s)",
-        "off\nbalance",
-        "deepest",
+        "from\nequilibrium",
+        "penetration",
         "recovery\n(s)",
-        "forces\ndiffer",
-        "tips\ndiffer",
+        "force\ndifference",
+        "tip\ndifference",
     ]);
     for configuration in &goal.configurations {
         let Some(events) = &configuration.events else {
@@ -172,13 +170,13 @@ fn stop_table(goal: &GoalReport) -> Table {
         "category",
         "engine",
         "at (s)",
-        "stands\nafter (s)",
-        "tip went\n(mm)",
-        "flange\n(mm)",
-        "off the\npath (mm)",
-        "least\n(mm)",
+        "stopping\ntime (s)",
+        "tip travel\n(mm)",
+        "flange travel\n(mm)",
+        "path\ndeviation (mm)",
+        "minimum\nclearance (mm)",
         "certified\n(mm)",
-        "predicted worst\ntip (mm)",
+        "worst-case tip\ntravel (mm)",
     ]);
     for configuration in &goal.configurations {
         let stop = configuration
@@ -212,12 +210,12 @@ fn retract_table(goal: &GoalReport) -> Table {
     let mut table = plain_table(&[
         "configuration",
         "engine",
-        "needle in\n(mm)",
-        "straight\n(mm)",
-        "guide off\nthe axis",
-        "turned by\n(urad)",
-        "touches",
-        "least\n(mm)",
+        "inserted\n(mm)",
+        "linear\n(mm)",
+        "guide\noff axis",
+        "rotation\n(urad)",
+        "contacts",
+        "minimum\nclearance (mm)",
         "certified\n(mm)",
     ]);
     for configuration in &goal.configurations {

@@ -1,15 +1,13 @@
-//! A run that excites every joint as text.
+//! An excitation run as text.
 
 use needlebench_cell::pair_in_words;
 use std::fmt::Write;
 
-use comfy_table::CellAlignment;
 use needlebench_bench::record_plan::{JointTelling, PlanReport};
 use needlebench_evaluation::excitation::{ExcitationReport, MotionReport, proven_m};
 use needlebench_evaluation::report::ClearanceReport;
-
-use super::{Table, plain_table};
-use crate::number::{rounded, small_length, three_digits};
+use needlebench_show::number::{rounded, small_length, three_digits};
+use needlebench_show::{CellAlignment, Table, plain_table};
 
 /// What a run prints.
 pub fn report_text(report: &ExcitationReport) -> String {
@@ -30,10 +28,10 @@ fn write_report(out: &mut String, report: &ExcitationReport) -> std::fmt::Result
     let mut table = plain_table(&[
         "engine",
         "added\n(kg)",
-        "proven (mm)\nothers / itself",
-        "tracking (mrad)\nrms / peak",
-        "torque\nof limit",
-        "cut\n(steps)",
+        "certified (mm)\nothers / self",
+        "tracking (mrad)\nRMS / peak",
+        "peak torque\nratio",
+        "saturated\n(steps)",
         "contact",
     ]);
     table.add_row([
@@ -76,7 +74,7 @@ fn write_report(out: &mut String, report: &ExcitationReport) -> std::fmt::Result
     if let Some(difference) = report.engine_difference {
         writeln!(
             out,
-            "engines differ by up to {} on the way and {} at the end",
+            "engine difference at the tip: at most {} in motion, {} at the end",
             small_length(difference.peak_tip_m),
             small_length(difference.settled_tip_m)
         )?;
@@ -93,7 +91,7 @@ fn both(clearance: &ClearanceReport) -> String {
     format!("{others} / {itself}")
 }
 
-/// A deviation: nobody needs more of it than two digits.
+/// A deviation with two significant digits.
 fn two_digits(value: f64) -> String {
     match value {
         value if value >= 9.5 => format!("{value:.0}"),
@@ -102,17 +100,18 @@ fn two_digits(value: f64) -> String {
     }
 }
 
-/// Proven clearances: by class, and motion by motion.
+/// Certified clearances: by class, and motion by motion.
 pub(crate) fn clearances_text(report: &PlanReport) -> String {
     let mut text = format!(
-        "Proven least clearances of {}: arm, tool and payload along every motion of the run, for the nominal \
-         arm.\nAsked for: {:.1} mm from everything else, {:.1} mm from itself.\n\n",
+        "Certified minimum clearances of {}: arm, tool and payload along every motion of the run, \
+         for the nominal arm.\nRequired: {:.1} mm from everything else, {:.1} mm \
+         self-clearance.\n\n",
         report.scenario,
         report.clearance_limit_m * 1e3,
         report.self_clearance_limit_m * 1e3
     );
     let _ = writeln!(text, "{}", class_table(report));
-    let mut table = plain_table(&["motion", "others\n(mm)", "itself\n(mm)", "nearest"]);
+    let mut table = plain_table(&["motion", "others\n(mm)", "self\n(mm)", "nearest"]);
     for each in &report.motions {
         let [others, itself] = proven_m(&each.clearance)
             .map(|value| value.map_or("-".to_owned(), |metres| format!("{:.1}", metres * 1e3)));
@@ -137,7 +136,7 @@ fn nearest(motion: &MotionReport) -> String {
 }
 
 fn class_table(report: &PlanReport) -> Table {
-    let mut table = plain_table(&["class", "proven (mm)", "attained (mm)", "pair"]);
+    let mut table = plain_table(&["class", "certified (mm)", "attained (mm)", "pair"]);
     for (class, found) in &report.planned.classes {
         if *class == "needle_corridor" {
             continue;
@@ -169,7 +168,8 @@ fn write_plan(out: &mut String, report: &PlanReport) -> std::fmt::Result {
     let payloads: Vec<String> = report.payloads_kg.iter().map(f64::to_string).collect();
     writeln!(
         out,
-        "{}: {} postures of {} free ones ({} drawn), sweeps of six joints, {:.0} s with each of {} kg",
+        "{}: {} postures selected from {} feasible ones ({} sampled), sweeps of six joints, {:.0} \
+         s with each payload of {} kg",
         report.scenario,
         report.postures,
         report.candidates[0],
@@ -180,9 +180,13 @@ fn write_plan(out: &mut String, report: &PlanReport) -> std::fmt::Result {
     if report.over_start > 0 {
         writeln!(
             out,
-            "{} of the ways lead{} over the start posture, which is counted as a posture there",
+            "{} motion{} via the start posture, which counts as a posture there",
             report.over_start,
-            if report.over_start == 1 { "s" } else { "" }
+            if report.over_start == 1 {
+                " leads"
+            } else {
+                "s lead"
+            }
         )?;
     }
     writeln!(out, "tool: {:.3} kg, always mounted", report.tool_kg)?;
@@ -194,32 +198,32 @@ fn write_plan(out: &mut String, report: &PlanReport) -> std::fmt::Result {
     };
     writeln!(
         out,
-        "what the log will tell, one standard deviation: this run / as many random postures without sweeps"
+        "predicted standard deviations: this run / as many random postures without sweeps"
     )?;
     let mut table = plain_table(&["", "this run", "random"]);
     for (name, a, b) in [
         (
-            "flange of the calibrated arm elsewhere, rms (mm)",
+            "flange position of the calibrated arm elsewhere, RMS (mm)",
             three_digits(here.flange_rms_m * 1e3),
             three_digits(random.flange_rms_m * 1e3),
         ),
         (
-            "the same, worst (mm)",
+            "flange position of the calibrated arm elsewhere, worst (mm)",
             three_digits(here.flange_worst_m * 1e3),
             three_digits(random.flange_worst_m * 1e3),
         ),
         (
-            "condition of the calibration",
+            "condition number of the calibration",
             condition(here.calibration_condition),
             condition(random.calibration_condition),
         ),
         (
-            "payload's mass (g)",
+            "payload mass (g)",
             known(here.payload_kg, 1e3),
             known(random.payload_kg, 1e3),
         ),
         (
-            "payload's centre (mm)",
+            "payload centre of mass (mm)",
             known(here.payload_centre_m, 1e3),
             known(random.payload_centre_m, 1e3),
         ),
@@ -229,11 +233,11 @@ fn write_plan(out: &mut String, report: &PlanReport) -> std::fmt::Result {
     writeln!(out, "{table}")?;
     let mut table = plain_table(&[
         "joint",
-        "rotor\n(g m^2)",
-        "constant\n(%)",
+        "rotor inertia\n(g m^2)",
+        "torque\nconstant (%)",
         "Coulomb\n(N m)",
         "viscous\n(Nms/rad)",
-        "standing\n(N m)",
+        "holding\n(N m)",
     ]);
     for (a, b) in here.joints.iter().zip(&random.joints) {
         let pair = |value: fn(&JointTelling) -> Option<f64>, factor: f64| {
@@ -259,7 +263,8 @@ fn write_plan(out: &mut String, report: &PlanReport) -> std::fmt::Result {
         if each.torque_constant_identified == Some(false) {
             writeln!(
                 out,
-                "not identified to a tenth: torque constant of {}: gravity and acceleration load it too little",
+                "not identified to 10 %: torque constant of {} (too little load from gravity and \
+                 acceleration)",
                 each.joint
             )?;
         }
@@ -271,13 +276,14 @@ fn write_plan(out: &mut String, report: &PlanReport) -> std::fmt::Result {
     {
         writeln!(
             out,
-            "nothing is known of the arm's torque constants: what currents tell is not said"
+            "torque constants of the arm unknown; uncertainty from currents not predicted"
         )?;
     }
     let noise = &report.noise;
     writeln!(
         out,
-        "assumed noise: flange {} and {:.1} mrad, torque {} N m, current {} A, another one every {} s",
+        "assumed noise: flange {} and {:.1} mrad, torque {} N m, current {} A, independent every \
+         {} s",
         small_length(noise.position_m),
         noise.rotation_rad * 1e3,
         noise.moment_nm,

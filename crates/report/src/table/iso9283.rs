@@ -2,13 +2,10 @@
 
 use std::fmt::Write;
 
-use comfy_table::CellAlignment;
-use needlebench_evaluation::iso9283::{
-    Drift, Iso9283Report, MeasuredReport, ProtocolStatistics, StabilisationReport,
-};
-
-use super::plain_table;
-use crate::number::{LengthUnit, small_length_or_zero, unit_of_length};
+use needlebench_evaluation::iso9283::{Iso9283Report, StabilisationReport};
+use needlebench_iso9283::{Drift, MeasuredReport, ProtocolStatistics};
+use needlebench_show::number::{LengthUnit, small_length_or_zero, unit_of_length};
+use needlebench_show::{CellAlignment, plain_table};
 
 /// What a run prints of its test.
 pub fn report_text(report: &Iso9283Report) -> String {
@@ -39,7 +36,7 @@ fn write_report(out: &mut String, report: &Iso9283Report) -> std::fmt::Result {
             100.0 * effort.peak_torque_ratio,
             100.0 * effort.peak_speed_ratio,
             if effort.saturated_steps > 0 {
-                format!(", torque cut in {} steps", effort.saturated_steps)
+                format!(", torque saturated in {} steps", effort.saturated_steps)
             } else {
                 String::new()
             }
@@ -56,7 +53,7 @@ fn write_report(out: &mut String, report: &Iso9283Report) -> std::fmt::Result {
     if let Some(difference) = report.engine_difference {
         writeln!(
             out,
-            "engines differ by up to {} on the way and {} in attained positions",
+            "engine difference: at most {} in motion, {} in attained positions",
             small_length_or_zero(difference.peak_tip_m),
             small_length_or_zero(difference.settled_tip_m)
         )?;
@@ -66,7 +63,10 @@ fn write_report(out: &mut String, report: &Iso9283Report) -> std::fmt::Result {
 
 /// What the analysis of a tracker's log prints.
 pub fn measured_text(report: &MeasuredReport) -> String {
-    let mut text = format!("ISO 9283: {} against {}\n", report.log, report.commanded);
+    let mut text = format!(
+        "ISO 9283: {} compared with {}\n",
+        report.log, report.commanded
+    );
     if let Some(fit) = &report.frame_fit {
         let [x, y, z] = fit.position_m.map(|metres| metres * 1e3);
         let angle_deg = fit

@@ -1,14 +1,12 @@
 //! Tables and lines for a terminal.
 
 pub mod atlas;
-mod block;
 pub(crate) mod budget;
 pub mod comparison;
 pub(crate) mod engine_headings;
 pub(crate) mod events;
 pub mod excitation;
 pub mod iso9283;
-mod plain;
 pub(crate) mod ranking;
 mod referee;
 pub mod replay;
@@ -24,8 +22,5 @@ pub mod suggest;
 pub(crate) mod true_target;
 pub(crate) mod verdict;
 
-pub use block::{Block, blocks_text};
-pub(crate) use block::{has_words, heading};
-pub use plain::{Table, plain_table};
 pub(crate) use run::route_wanted_m;
 pub use run::{fissures_in_words, rejected_in_words, report_screen, report_text, route_in_words};

@@ -1,12 +1,9 @@
-//! The comparison table of a goal: rank, score, Pareto set and what the score is made of.
+//! The comparison table of a goal: rank, score, Pareto set and contributions to the score.
 
-use comfy_table::{Cell, CellAlignment, Color};
 use needlebench_evaluation::metric::Metric;
 use needlebench_evaluation::ranking::{GoalRanking, RankedMetric, RankingReport};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
-
-use super::{Table, plain_table};
-use crate::layout;
+use needlebench_show::{Cell, CellAlignment, Color, Table, layout, plain_table};
 
 /// A row of the table: configurations that were ranked, first choice first.
 pub(crate) struct Row<'a> {
@@ -115,7 +112,7 @@ pub(crate) fn comparison_text(goal: &GoalReport) -> Option<String> {
     let (metrics, others) = split(ranking, &rows);
     let mut lines = vec![
         table(&rows, &metrics).to_string(),
-        "score of 100, in brackets what each metric contributes to it by its weight".to_owned(),
+        "score of 100; in brackets: weighted contribution of each metric".to_owned(),
     ];
     if !others.is_empty() {
         let words: Vec<String> = others
@@ -123,7 +120,7 @@ pub(crate) fn comparison_text(goal: &GoalReport) -> Option<String> {
             .map(|metric| format!("{} x {}", words(metric.name), metric.weight))
             .collect();
         lines.push(format!(
-            "these count too, but differ less or not at all: {}",
+            "also counted, with smaller or no differences: {}",
             words.join(", ")
         ));
     }

@@ -1,13 +1,11 @@
-//! The engines beside the referee, as a table.
+//! The engines compared with the reference integrator, as a table.
 
-use comfy_table::{Cell, CellAlignment, Color};
 use needlebench_evaluation::referee::RefereeComparison;
 use needlebench_evaluation::report::GoalReport;
+use needlebench_show::number::small_length;
+use needlebench_show::{Cell, CellAlignment, Color, Table, plain_table};
 
-use super::{Table, plain_table};
-use crate::number::small_length;
-
-/// One row for each configuration and engine; none unless the referee was called.
+/// One row for each configuration and engine; none without the reference integrator.
 pub(super) fn referee_table(goal: &GoalReport) -> Option<Table> {
     let header = [
         "configuration",

@@ -5,9 +5,8 @@ use std::fmt::Write;
 use needlebench_bench::replay::{ReplayReport, TIP_M};
 use needlebench_kinematics::JOINT_LABELS;
 use needlebench_recorded::{CalibrationFit, Estimate, LogKind, PoseError};
-
-use super::plain_table;
-use crate::number::{rounded, small_length, value_and_limit};
+use needlebench_show::number::{rounded, small_length, value_and_limit};
+use needlebench_show::plain_table;
 
 /// The whole report, for a terminal of 80 columns.
 pub fn text(report: &ReplayReport) -> String {
@@ -22,8 +21,7 @@ pub fn text(report: &ReplayReport) -> String {
     out.trim_end().to_owned()
 }
 
-/// A value with its interval: `0.6120 +-0.0001`, in parentheses where the run does not show it well
-/// enough.
+/// A value with its interval: `0.6120 +-0.0001`, in parentheses where it is not identifiable from the run.
 pub fn shown(estimate: &Estimate, unit: f64) -> String {
     let Some(value) = estimate.value else {
         return "not identifiable".to_owned();
@@ -96,7 +94,7 @@ fn head(out: &mut String, report: &ReplayReport) {
     if let [best, next, ..] = arm.fits.as_slice() {
         let _ = writeln!(
             out,
-            "nominal lengths against the log's poses: {} {:.3} mm rms, next {} {:.1} mm",
+            "nominal lengths, error at the log's poses: {} {:.3} mm RMS, next {} {:.1} mm",
             best.arm,
             best.rms_m * 1e3,
             next.arm,
@@ -106,21 +104,22 @@ fn head(out: &mut String, report: &ReplayReport) {
     if let Some([low, high]) = log.temperature_c {
         let _ = writeln!(
             out,
-            "joints at {low:.0} to {high:.0} degrees C (friction falls as they warm up)"
+            "joint temperatures {low:.0} to {high:.0} degrees C (friction decreases with \
+             temperature)"
         );
     }
     let _ = writeln!(out);
 }
 
-/// What nominal lengths and the calibration leave of the log's poses, in words.
+/// Errors of nominal lengths and of the calibration at the log's poses.
 pub(crate) fn pose_errors(fit: &CalibrationFit) -> [(&'static str, &PoseError); 5] {
     [
         ("nominal lengths, all rows", &fit.nominal),
         ("calibrated, all rows", &fit.fitted),
-        ("nominal, held out by fifths", &fit.nominal_held_out),
-        ("calibrated, held out by fifths", &fit.held_out),
+        ("nominal, 5-fold cross-validation", &fit.nominal_held_out),
+        ("calibrated, 5-fold cross-validation", &fit.held_out),
         (
-            "calibrated on the first half, on the second",
+            "calibrated on the first half, evaluated on the second",
             &fit.second_half,
         ),
     ]
@@ -128,13 +127,10 @@ pub(crate) fn pose_errors(fit: &CalibrationFit) -> [(&'static str, &PoseError); 
 
 fn calibration(out: &mut String, report: &ReplayReport) {
     let Some(fit) = &report.calibration else {
-        let _ = writeln!(
-            out,
-            "calibration: none, for the log has no poses of the tool's point\n"
-        );
+        let _ = writeln!(out, "calibration: none, the log has no TCP poses\n");
         return;
     };
-    let mut table = plain_table(&["poses of the tool's point", "rms (mm)", "largest (mm)"]);
+    let mut table = plain_table(&["TCP poses", "RMS (mm)", "maximum (mm)"]);
     for (name, error) in pose_errors(fit) {
         table.add_row([
             name.to_owned(),
@@ -143,9 +139,9 @@ fn calibration(out: &mut String, report: &ReplayReport) {
         ]);
     }
     let kept = if fit.is_worth {
-        "kept"
+        "used"
     } else {
-        "not kept: it does not predict what it has not seen"
+        "not used: it does not predict held-out poses"
     };
     let _ = writeln!(out, "calibration, {kept}\n{table}\n");
 }
@@ -154,11 +150,11 @@ fn identification(out: &mut String, report: &ReplayReport) {
     let found = &report.identification;
     if let Some(fit) = &found.controller {
         let mut table = plain_table(&[
-            "controller's model",
+            "controller model",
             "rotor (kg m^2)",
-            "left\n(N m)",
-            "held out\n(N m)",
-            "by data\n(N m)",
+            "residual\n(N m)",
+            "held-out\n(N m)",
+            "from data\n(N m)",
         ]);
         for (joint, label) in JOINT_LABELS.iter().enumerate() {
             let by_data = fit.rms_by_data_nm.map(|rms| rms[joint]);
@@ -176,15 +172,15 @@ fn identification(out: &mut String, report: &ReplayReport) {
             "gravity {} m/s^2; links {}",
             shown(&fit.gravity_m_s2, 1.0),
             if fit.has_tensors {
-                "with their tensors"
+                "with inertia tensors"
             } else {
-                "as points at their centres of mass"
+                "as point masses at their centres of mass"
             }
         );
         for load in &fit.loads {
             let logged = load.logged.map_or(String::new(), |load| {
                 let [x, y, z] = load.centre_m.map(|each| rounded(each * 1e3, 2));
-                format!("; the log says {} kg at ({x}, {y}, {z}) mm", load.mass_kg)
+                format!("; logged {} kg at ({x}, {y}, {z}) mm", load.mass_kg)
             });
             let _ = writeln!(out, "load {} kg{logged}", shown(&load.mass_kg, 1.0));
         }
@@ -194,9 +190,9 @@ fn identification(out: &mut String, report: &ReplayReport) {
         let mut table = plain_table(&[
             law.of,
             "k (N m/A)",
-            "sliding (N m)",
+            "Coulomb (N m)",
             "viscous\n(N m s/rad)",
-            "held out\n(A)",
+            "held-out\n(A)",
         ]);
         for (label, drive) in JOINT_LABELS.iter().zip(&law.joints) {
             table.add_row([
@@ -213,9 +209,9 @@ fn identification(out: &mut String, report: &ReplayReport) {
         let mut table = plain_table(&[
             "measured",
             "rotor\n(kg m^2)",
-            "sliding\n(N m)",
+            "Coulomb\n(N m)",
             "viscous\n(N m s/rad)",
-            "held out\n(N m)",
+            "held-out\n(N m)",
         ]);
         for (joint, label) in JOINT_LABELS.iter().enumerate() {
             table.add_row([
@@ -235,7 +231,7 @@ fn identification(out: &mut String, report: &ReplayReport) {
     if found.controller.is_some() || found.current.is_some() || found.measured.is_some() {
         let _ = writeln!(
             out,
-            "+- is half of a 95 % interval; in parentheses: not identifiable from this run\n"
+            "+-: half-width of the 95 % CI; in parentheses: not identifiable from this run\n"
         );
     }
 }
@@ -252,7 +248,7 @@ fn comparison(out: &mut String, report: &ReplayReport) {
     if columns.is_empty() {
         return;
     }
-    let mut header = vec!["following the set-points"];
+    let mut header = vec!["set-point tracking"];
     header.extend(columns.iter().map(|(name, _)| *name));
     let mut table = plain_table(&header);
     let mut row = |name: String, of: &dyn Fn(&needlebench_recorded::Tracking) -> String| {
@@ -262,32 +258,32 @@ fn comparison(out: &mut String, report: &ReplayReport) {
     };
     let lag = |value: Option<f64>| value.map_or("-".to_owned(), |s| rounded(s * 1e3, 4));
     row("lag (ms)".to_owned(), &|each| lag(each.lag_of_all_s.value));
-    row("lag, +- of 95 % (ms)".to_owned(), &|each| {
+    row("lag, +- 95 % CI (ms)".to_owned(), &|each| {
         lag(each.lag_of_all_s.half_width)
     });
     for (joint, label) in JOINT_LABELS.iter().enumerate() {
-        row(format!("{label} rms (mrad)"), &|each| {
+        row(format!("{label}, RMS (mrad)"), &|each| {
             rounded(each.rms_rad[joint] * 1e3, 4)
         });
     }
     let optional = |value: Option<f64>| value.map_or("-".to_owned(), |m| rounded(m * 1e3, 4));
-    row(format!("tip at {:.0} mm, rms (mm)", TIP_M * 1e3), &|each| {
+    row(format!("tip at {:.0} mm, RMS (mm)", TIP_M * 1e3), &|each| {
         rounded(each.tip_rms_m * 1e3, 4)
     });
-    row("tip, largest (mm)".to_owned(), &|each| {
+    row("tip, maximum (mm)".to_owned(), &|each| {
         rounded(each.tip_largest_m * 1e3, 4)
     });
-    row("tip at rest, rms (mm)".to_owned(), &|each| {
+    row("tip at rest, RMS (mm)".to_owned(), &|each| {
         optional(each.standing_tip_rms_m)
     });
-    row("tip at rest, largest (mm)".to_owned(), &|each| {
+    row("tip at rest, maximum (mm)".to_owned(), &|each| {
         optional(each.standing_tip_largest_m)
     });
     let _ = writeln!(out, "{table}\n");
     if report.engines.is_empty() {
         return;
     }
-    let mut header = vec!["engine against"];
+    let mut header = vec!["engine compared with"];
     header.extend(report.engines.keys().copied());
     let mut table = plain_table(&header);
     let mut row =
@@ -301,23 +297,23 @@ fn comparison(out: &mut String, report: &ReplayReport) {
             );
             table.add_row(cells);
         };
-    row("the real tip, rms (mm)".to_owned(), &|each| {
+    row("real tip, RMS (mm)".to_owned(), &|each| {
         each.against_real
             .as_ref()
             .map(|real| rounded(real.tip_rms_m * 1e3, 4))
     });
-    row("the real tip, largest (mm)".to_owned(), &|each| {
+    row("real tip, maximum (mm)".to_owned(), &|each| {
         each.against_real
             .as_ref()
             .map(|real| rounded(real.tip_largest_m * 1e3, 4))
     });
     for (joint, label) in JOINT_LABELS.iter().enumerate() {
-        row(format!("target_moment, {label}, rms (N m)"), &|each| {
+        row(format!("target_moment, {label}, RMS (N m)"), &|each| {
             each.torque_rms_nm.map(|rms| rounded(rms[joint], 4))
         });
     }
     for (joint, label) in JOINT_LABELS.iter().enumerate() {
-        row(format!("actual_current, {label}, rms (A)"), &|each| {
+        row(format!("actual_current, {label}, RMS (A)"), &|each| {
             each.current_rms_a[joint].map(|rms| rounded(rms, 3))
         });
     }
@@ -328,7 +324,7 @@ fn comparison(out: &mut String, report: &ReplayReport) {
     let _ = writeln!(out);
 }
 
-/// What the log and its replay say, before any table.
+/// The results of the log and its replay, before any table.
 fn answer(out: &mut String, report: &ReplayReport) {
     let length = |m: f64| {
         if m < 1e-6 {
@@ -340,7 +336,7 @@ fn answer(out: &mut String, report: &ReplayReport) {
     if let Some(fit) = report.calibration.as_ref().filter(|fit| fit.is_worth) {
         let _ = writeln!(
             out,
-            "calibration: poses that it has not seen are off by {} rms, by nominal lengths {}",
+            "calibration: RMS error at held-out poses {}, with nominal lengths {}",
             length(fit.held_out.rms_m),
             length(fit.nominal_held_out.rms_m)
         );
@@ -348,11 +344,11 @@ fn answer(out: &mut String, report: &ReplayReport) {
     if let Some(real) = &report.real {
         let lag = real.lag_of_all_s.value;
         let lag = lag.map_or(String::new(), |s| {
-            format!("; it lags {} ms", rounded(s * 1e3, 2))
+            format!("; lag {} ms", rounded(s * 1e3, 2))
         });
         let _ = writeln!(
             out,
-            "the arm follows its set-points within {} rms at the tip, {} at most{lag}",
+            "tracking error of the real arm at the tip: {} RMS, maximum {}{lag}",
             length(real.tip_rms_m),
             length(real.tip_largest_m)
         );
@@ -361,7 +357,7 @@ fn answer(out: &mut String, report: &ReplayReport) {
         if let Some(real) = &engine.against_real {
             let _ = writeln!(
                 out,
-                "{name} follows the arm's own tip within {} rms, {} at most",
+                "{name} compared with the real tip: {} RMS, maximum {}",
                 length(real.tip_rms_m),
                 length(real.tip_largest_m)
             );
@@ -406,7 +402,7 @@ fn verdict(out: &mut String, report: &ReplayReport) {
             .map_or(String::new(), |name| format!(" in {name}"));
         let _ = writeln!(
             out,
-            "NOT JUDGED {}{engine}: {}",
+            "NOT EVALUATED {}{engine}: {}",
             open.criterion, open.reason
         );
     }

@@ -1,21 +1,20 @@
-//! Routes as tables, with what to paste.
+//! Needle paths as tables, with the keys to paste.
 
 use std::fmt::Write;
 
 use needlebench_bench::routes::{ConfigurationAnswer, RouteAnswer, RoutePlan, SAME_ODDS, WhyNot};
 use needlebench_bench::suggest::Refused;
 use needlebench_cell::{part_in_words, reason_in_words};
+use needlebench_show::plain_table;
 
-use super::plain_table;
-
-/// Routes of the table.
+/// Needle paths of the table.
 const SHOWN: usize = 8;
 
-/// Routes to a target.
+/// Needle paths to a target.
 pub fn routes_text(plan: &RoutePlan) -> String {
     let mut text = head(plan);
     if plan.routes.is_empty() {
-        text.push_str("none of them is free");
+        text.push_str("no direction is admissible");
         return text;
     }
     match &plan.chosen {
@@ -29,7 +28,8 @@ pub fn routes_text(plan: &RoutePlan) -> String {
         None => {
             let _ = writeln!(
                 text,
-                "none of the {} routes that stand for the rest is served in {} of 8 configurations, mostly because of {}",
+                "none of the {} representative paths is feasible in {} of 8 configurations; main \
+                 reason: {}",
                 plan.routes.len(),
                 plan.wanted,
                 counts(&plan.robot_refused)
@@ -37,18 +37,18 @@ pub fn routes_text(plan: &RoutePlan) -> String {
         }
     }
     if let Some(why) = &plan.robot_not_asked {
-        let _ = writeln!(text, "no robot was asked: {why}");
+        let _ = writeln!(text, "robot not checked: {why}");
     }
     if let Some(why_not) = &plan.why_not {
         let _ = writeln!(text, "{}", refused_route(why_not));
     }
     let _ = writeln!(text, "\n{}", table(plan));
     text.push_str(
-        "odds: of a pneumothorax against a route with none of the terms, by published ratios; an\n  order, no \
-         probability\nbone, vessel, organ: lower bounds of the needle's distance",
+        "odds: product of published pneumothorax odds ratios relative to a path without risk \
+         factors; for ranking only, not a probability\nbone, vessel, organ: lower bounds of the needle clearance",
     );
     if plan.margins.iter().any(|margin| !margin.known) {
-        text.push_str("\n?: the patient has nothing of it that anybody has seen");
+        text.push_str("\n?: no such structure labelled in this patient");
     }
     if let Some(chosen) = &plan.chosen {
         let route = &plan.routes[chosen.route];
@@ -72,7 +72,8 @@ fn head(plan: &RoutePlan) -> String {
             format!(", in the scan [{}]", place.join(", "))
         });
     format!(
-        "routes to {}, target [{x:.1}, {y:.1}, {z:.1}] mm{scan}\n{} of {} directions are free by {}; refused: {}\n",
+        "needle paths to {}, target [{x:.1}, {y:.1}, {z:.1}] mm{scan}\n{} of {} directions \
+         admissible by {}; rejected: {}\n",
         plan.goal,
         plan.free,
         plan.tried,
@@ -91,34 +92,39 @@ fn best(route: &RouteAnswer) -> Option<&ConfigurationAnswer> {
 }
 
 fn choice(plan: &RoutePlan, route: &RouteAnswer, index: usize) -> String {
-    let mut text = format!("route {}, {:.0} mm deep", index + 1, route.depth_m * 1e3);
+    let mut text = format!("path {}, {:.0} mm deep", index + 1, route.depth_m * 1e3);
     if let Some(best) = best(route) {
         let _ = write!(
             text,
-            ", served in {} of 8 configurations, by postures alone best in {}",
+            "; feasible in {} of 8 configurations, margins satisfied including their own error; \
+             best posture {}",
             route.working, best.label
         );
         if let Some(clearance_m) = best.clearance_m {
-            let _ = write!(text, ": clearance {:.1} mm", clearance_m * 1e3);
+            let _ = write!(text, ", clearance {:.1} mm", clearance_m * 1e3);
         }
         if let Some(error) = &best.error {
             let _ = write!(
                 text,
-                ", expected {:.1} mm rms across the needle",
+                ", RMS lateral error {:.1} mm",
                 error.target_lateral_rms_m * 1e3
             );
         }
         if let Some(spare_m) = best.spare_m {
             let _ = write!(
                 text,
-                ", with {:.1} mm to spare beyond its margins with {} standard deviations",
+                ", {:.1} mm in excess of its margins including {} standard deviations",
                 spare_m * 1e3,
                 plan.sigmas
             );
         }
+    }
+    if let Some(because) = plan.chosen.as_ref().and_then(|it| it.because.as_ref()) {
+        let label = plan.chosen.as_ref().and_then(|it| it.configuration);
         let _ = write!(
             text,
-            " (motions not planned: `run` of the plan ranks the configurations by all that it measures)"
+            "\nrecommended: {} - {because}",
+            label.unwrap_or("none")
         );
     }
     text
@@ -126,7 +132,7 @@ fn choice(plan: &RoutePlan, route: &RouteAnswer, index: usize) -> String {
 
 fn refused_route(why_not: &WhyNot) -> String {
     let mut text = format!(
-        "route {} comes first and is not served: {}",
+        "path {} ranks first but is infeasible: {}",
         why_not.route + 1,
         counts(&why_not.reasons)
     );
@@ -134,12 +140,13 @@ fn refused_route(why_not: &WhyNot) -> String {
         let _ = if libm::log(odds).abs() < SAME_ODDS {
             write!(
                 text,
-                "; its odds are those of the chosen one as far as odds are known ({odds:.2} times), and it has more to spare"
+                "; its odds equal those of the chosen path within the known uncertainty ({odds:.2} \
+                 times), and its margins are larger"
             )
         } else {
             write!(
                 text,
-                "; its odds are {odds:.2} times those of the chosen one"
+                "; its odds are {odds:.2} times those of the chosen path"
             )
         };
     }
@@ -149,17 +156,17 @@ fn refused_route(why_not: &WhyNot) -> String {
             .iter()
             .map(|each| {
                 let change = each.toml.replace('\n', " ");
-                format!("`{change}` ({} of 8 work)", each.working)
+                format!("`{change}` ({} of 8 feasible)", each.working)
             })
             .collect();
         if freed.is_empty() {
             let _ = write!(
                 text,
-                "; nothing frees it of what was tried: {}",
+                "; no change tried makes it feasible: {}",
                 freeing.tried
             );
         } else {
-            let _ = write!(text, "; what frees it: {}", freed.join(", or "));
+            let _ = write!(text, "; made feasible by {}", freed.join(", or "));
         }
     }
     text
@@ -175,8 +182,8 @@ fn counts(reasons: &[Refused]) -> String {
 
 fn words(rule: &str) -> String {
     match rule {
-        "margin_with_error" => "margin less than its own error asks for".to_owned(),
-        "expected_error" => "its error cannot be told".to_owned(),
+        "margin_with_error" => "margin too small for its own error".to_owned(),
+        "expected_error" => "its error is unknown".to_owned(),
         other => reason_in_words(other),
     }
 }
@@ -185,7 +192,7 @@ fn table(plan: &RoutePlan) -> String {
     let mut header = vec![
         "",
         "direction\n(deg)",
-        "deep\n(mm)",
+        "depth\n(mm)",
         "in lung\n(mm)",
         "odds",
         "bone\n(mm)",
@@ -194,7 +201,12 @@ fn table(plan: &RoutePlan) -> String {
     ];
     let with_robot = plan.robot_not_asked.is_none();
     if with_robot {
-        header.extend(["serve", "best", "clear\n(mm)", "rms\n(mm)"]);
+        header.extend([
+            "feasible\nin",
+            "best\nposture",
+            "clearance\n(mm)",
+            "lateral\nRMS (mm)",
+        ]);
     }
     let mut table = plain_table(&header);
     let chosen = plan.chosen.as_ref().map(|chosen| chosen.route);
@@ -237,7 +249,7 @@ fn table(plan: &RoutePlan) -> String {
     let rest = plan.routes.len().saturating_sub(SHOWN);
     let mut text = table.to_string();
     if rest > 0 {
-        let _ = write!(text, "\n{rest} more are in the file");
+        let _ = write!(text, "\n{rest} more in the file");
     }
     text
 }
@@ -274,7 +286,7 @@ fn terms(route: &RouteAnswer) -> String {
         "# odds x{:.2}: {}\n# nearest: {}",
         route.risk.odds_ratio,
         if terms.is_empty() {
-            "no term".to_owned()
+            "no risk factor".to_owned()
         } else {
             terms.join(", ")
         },

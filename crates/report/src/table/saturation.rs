@@ -1,10 +1,10 @@
-//! Joints that asked for more torque than they have, for the report's text.
+//! Joints whose torque saturated, for the report's text.
 
 use std::fmt::Write;
 
 use needlebench_evaluation::report::GoalReport;
 
-/// One line per configuration, engine and joint; empty if no torque was ever cut.
+/// One line per configuration, engine and joint; empty if no torque was saturated.
 pub(crate) fn saturation_text(goal: &GoalReport) -> String {
     let mut out = String::new();
     for configuration in &goal.configurations {
@@ -13,7 +13,7 @@ pub(crate) fn saturation_text(goal: &GoalReport) -> String {
                 // Writing to a String cannot fail.
                 let _ = write!(
                     out,
-                    "torque at its limit: {} in {engine}, {} for {} steps ({:.1} % of the time)",
+                    "torque saturation: {} in {engine}, {} for {} steps ({:.1} % of the time)",
                     configuration.label,
                     cut.joint,
                     cut.steps,

@@ -3,17 +3,16 @@
 use std::fmt::Write;
 
 use needlebench_bench::search::PreparedSearch;
+use needlebench_show::layout::wrapped;
+use needlebench_show::number::percent;
+use needlebench_show::plain_table;
 use needlebench_study::Role;
 use needlebench_study::search::{CandidateLog, Estimate, Objective, SearchLog};
 
-use super::plain_table;
-use crate::layout::wrapped;
-use crate::number::percent;
-
-/// Rows of those who cannot be told from the winner, at most.
+/// Most rows of candidates tied with the winner.
 const MOST_ROWS: usize = 8;
 
-/// The answer, or how far it is.
+/// The answer, or the progress.
 pub(crate) fn search_text(search: &PreparedSearch, log: &SearchLog) -> String {
     let name = &search.study.file.name;
     let Some(answer) = &log.answer else {
@@ -26,40 +25,44 @@ pub(crate) fn search_text(search: &PreparedSearch, log: &SearchLog) -> String {
             text,
             "{}",
             wrapped(&format!(
-                "{name}: none is recommended: the best of {} candidates works in none of {} layouts",
+                "{name}: no recommendation: the best of {} candidates is feasible in none of {} layouts",
                 log.candidates.len(),
                 answer.rate.cases
             ))
         );
     }
+    let rate = match objective {
+        Objective::Rate => String::new(),
+        _ => format!(
+            ", {} {}",
+            Objective::Rate.words(),
+            with_interval(Objective::Rate, &answer.rate)
+        ),
+    };
     let _ = writeln!(
         text,
         "{}",
         wrapped(&format!(
-            "{name}: {} {}, of the best of {} candidates, on {} layouts that none was compared by; {} of \
-             layouts work{} (postures only)",
+            "{name}: best of {} candidates: {} {}{rate}, on {} held-out layouts (postures only)",
+            log.candidates.len(),
             objective.words(),
             with_interval(objective, &answer.figures[0]),
-            log.candidates.len(),
             answer.figures[0].cases,
-            figure(Objective::Rate, answer.rate.value),
-            interval(Objective::Rate, &answer.rate)
-                .map_or(String::new(), |interval| format!(" ({interval})")),
         ))
     );
     let mut listed: Vec<(usize, &str)> = if answer.front.is_empty() {
         let others = answer.equals.iter().filter(|&&id| id != answer.winner);
         std::iter::once((answer.winner, "best"))
-            .chain(others.map(|&id| (id, "as good")))
+            .chain(others.map(|&id| (id, "tied")))
             .collect()
     } else {
         let members = answer.front.iter();
         members
             .map(|member| {
                 let what = match (member.is_certain, member.by_estimate) {
-                    (true, _) => "on the front",
-                    (false, true) => "on it, maybe",
-                    (false, false) => "maybe",
+                    (true, _) => "Pareto-optimal",
+                    (false, true) => "probably Pareto-optimal",
+                    (false, false) => "possibly Pareto-optimal",
                 };
                 (member.id, what)
             })
@@ -84,17 +87,17 @@ fn table(search: &PreparedSearch, log: &SearchLog, listed: &[(usize, &str)]) -> 
         .choices()
         .map(|factor| match factor.unit.as_str() {
             "" => factor.name.clone(),
-            unit => format!("{}\n{unit}", factor.name),
+            unit => format!("{}\n({unit})", factor.name),
         })
         .collect();
     let figures = log
         .objectives
         .iter()
         .map(|objective| match objective.unit() {
-            "1" => "works".to_owned(),
+            "1" => "success\nrate".to_owned(),
             unit => match objective {
-                Objective::Margin { .. } => format!("{}\n{unit}", objective.words()),
-                _ => format!("tip error\n{unit}"),
+                Objective::Margin { .. } => format!("{}\n({unit})", objective.words()),
+                _ => format!("tip error\n({unit})"),
             },
         });
     let figures: Vec<String> = figures.collect();
@@ -103,7 +106,7 @@ fn table(search: &PreparedSearch, log: &SearchLog, listed: &[(usize, &str)]) -> 
     header.extend(headings.iter().map(String::as_str));
     header.extend(figures.iter().map(String::as_str));
     if !has_rate {
-        header.push("works");
+        header.push("success\nrate");
     }
     let mut table = plain_table(&header);
     for (id, what) in listed {
@@ -128,23 +131,22 @@ fn sentences(search: &PreparedSearch, log: &SearchLog) -> Vec<String> {
     let answer = log.answer.as_ref().expect("it is finished");
     let winner: &CandidateLog = &log.candidates[answer.winner];
     let mut all = vec![format!(
-        "Figures of the table are by the {} layouts that candidates were compared by: they flatter the best.",
+        "Table values are from the {} selection layouts and are optimistically biased.",
         winner.cases
     )];
     if answer.front.is_empty() {
         let equals = answer.equals.len() - 1;
         let undecided = answer.undecided.len();
         all.push(format!(
-            "{} told from the best, all pairs together but for 5 %{}.",
+            "{} significantly different from the best (family-wise error rate 5 %){}.",
             match equals {
-                0 => "All others with all layouts are".to_owned(),
-                1 => "1 other with all layouts cannot be".to_owned(),
-                _ => format!("{equals} others with all layouts cannot be"),
+                0 => "All other finalists are".to_owned(),
+                1 => "1 other finalist is not".to_owned(),
+                _ => format!("{equals} other finalists are not"),
             },
             match undecided {
                 0 => String::new(),
-                1 => "; 1 was dropped with fewer and may be as good".to_owned(),
-                _ => format!("; {undecided} were dropped with fewer and may be as good"),
+                _ => format!("; {undecided} eliminated earlier may be equivalent"),
             }
         ));
     } else {
@@ -154,18 +156,18 @@ fn sentences(search: &PreparedSearch, log: &SearchLog) -> Vec<String> {
             .filter(|member| member.is_certain)
             .count();
         all.push(format!(
-            "{certain} of {} are on the front for certain, all pairs and both objectives together but for 5 %.",
+            "{certain} of {} are Pareto-optimal (family-wise error rate 5 % over all pairs and both objectives).",
             answer.front.len()
         ));
     }
     let grid = search.grid_cases().map_or(String::new(), |grid| {
         format!(
-            ", {} of the {grid} of all choices with all layouts",
+            " ({} of an exhaustive {grid})",
             percent(log.cases as f64 / grid as f64)
         )
     });
     all.push(format!(
-        "{} cases{grid}, in {} generations; reach alone ruled out {}, which spared {}.",
+        "{} cases{grid} in {} generations; {} eliminated by reachability alone ({} saved).",
         log.cases,
         log.generations.len(),
         counted(log.ruled_out as u64, "candidate"),
@@ -197,7 +199,7 @@ fn counted(count: u64, what: &str) -> String {
     }
 }
 
-/// A choice as people read it.
+/// The value of a control factor as people read it.
 pub(crate) fn shown(value: &serde_json::Value) -> String {
     match value {
         serde_json::Value::String(text) => text.clone(),
@@ -205,7 +207,7 @@ pub(crate) fn shown(value: &serde_json::Value) -> String {
     }
 }
 
-/// A figure with its unit.
+/// The value of an objective, without its unit.
 pub(crate) fn figure(objective: Objective, value: Option<f64>) -> String {
     match (objective, value) {
         (_, None) => "none".to_owned(),
@@ -223,16 +225,16 @@ fn interval(objective: Objective, estimate: &Estimate) -> Option<String> {
     let interval = estimate.interval;
     match (interval.low, interval.high) {
         (Some(low), Some(high)) => Some(format!(
-            "95 %: {} to {}",
+            "95 % CI {} to {}",
             figure(objective, Some(low)),
             figure(objective, Some(high))
         )),
         (None, Some(high)) => Some(format!(
-            "97.5 % sure: at most {}",
+            "97.5 % upper confidence bound {}",
             figure(objective, Some(high))
         )),
         (Some(low), None) => Some(format!(
-            "97.5 % sure: at least {}",
+            "97.5 % lower confidence bound {}",
             figure(objective, Some(low))
         )),
         (None, None) => None,

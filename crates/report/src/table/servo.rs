@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use super::plain_table;
-use crate::number::rounded;
 use needlebench_bench::servo::experiment::JointResponse;
 use needlebench_bench::servo::{JointReport, ServoReport};
+use needlebench_show::number::rounded;
+use needlebench_show::plain_table;
 
 /// The whole report.
 pub fn text(report: &ServoReport) -> String {
@@ -26,8 +26,8 @@ pub fn text(report: &ServoReport) -> String {
     let margins = &report.margins;
     let _ = writeln!(
         out,
-        "{}: all joints together and sampled, the slowest motion shrinks to {:.4} in a step; stays stable up to {} \
-         these gains, or steps {}\n",
+        "{}: spectral radius {:.4} per step (all joints, sampled); stable up to {} these gains, or \
+         for steps {}\n",
         if margins.spectral_radius < 1.0 {
             "STABLE"
         } else {
@@ -41,7 +41,7 @@ pub fn text(report: &ServoReport) -> String {
             )),
         margins
             .timestep_s
-            .map_or("without bound".to_owned(), |step_s| {
+            .map_or("of any length".to_owned(), |step_s| {
                 format!("up to {:.3} ms", step_s * 1e3)
             })
     );
@@ -51,7 +51,7 @@ pub fn text(report: &ServoReport) -> String {
         "natural (Hz)",
         "damping",
         "bandwidth (Hz)",
-        "gain margin\nof it alone",
+        "gain margin\n(alone)",
     ]);
     for joint in &report.joints {
         let closed = &joint.closed_loop;
@@ -74,10 +74,10 @@ pub fn text(report: &ServoReport) -> String {
         "rise (ms)",
         "overshoot",
         "settled (ms)",
-        "at the limit",
-        "off the linear loop",
-        "gain off by (dB)",
-        "phase off by (deg)",
+        "saturated",
+        "linear-loop deviation",
+        "gain deviation (dB)",
+        "phase deviation (deg)",
     ]);
     for joint in &report.joints {
         for response in &joint.responses {

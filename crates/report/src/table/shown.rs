@@ -1,10 +1,21 @@
 //! Which metrics tables and pages show, and how.
 
-use needlebench_evaluation::metric::{Bound, Heading, Metric, MetricKey, metrics};
+use needlebench_evaluation::metric::{Bound, Heading, Metric, MetricKey, Show, metrics};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
+use needlebench_show::number::{millimetres, percent_with, small_length};
 
 use super::engine_headings::EngineHeading;
-use crate::number::shown;
+
+/// A metric's value in SI units as tables show it.
+pub(crate) fn metric_text(show: Show, value: f64) -> String {
+    match show {
+        Show::Millimetres => millimetres(value),
+        Show::SmallLength => small_length(value),
+        Show::Seconds | Show::Number => format!("{value:.2}"),
+        Show::Percent => percent_with(value, 0),
+        Show::Degrees => format!("{:.1}", value.to_degrees()),
+    }
+}
 
 /// What a column shows: a metric, or what comes nearest to it where a configuration does not have it.
 ///
@@ -59,7 +70,7 @@ impl Shown {
     pub fn value(&self, configuration: &ConfigurationReport) -> Option<(f64, String)> {
         let mut keys = [&self.key].into_iter().chain(&self.otherwise);
         let value = keys.find_map(|key| key.read(configuration))?;
-        Some((value, shown(self.metric().show, value)))
+        Some((value, metric_text(self.metric().show, value)))
     }
 
     /// Whether there is anything to say of a goal: of true targets there is not where none is known.

@@ -1,12 +1,10 @@
 //! Two studies side by side.
 
-use comfy_table::{Cell, CellAlignment, Color};
+use needlebench_show::number::percent_with;
+use needlebench_show::{Cell, CellAlignment, Color, plain_table};
 use needlebench_study::compare::{
     Change, Paired, StudyComparison, StudyFailure, StudySide, Transition, value_text, what,
 };
-
-use super::plain_table;
-use crate::number::percent_with;
 
 /// Smallest difference of values that is shown as one, in their unit: 1 um, 0.01 %.
 const SAME: f64 = 1e-3;
@@ -60,15 +58,14 @@ fn transition_text(what: &str, transition: &Transition) -> Option<String> {
 /// What changed case by case.
 fn paired_lines(paired: &Paired) -> Vec<String> {
     let mut lines = vec![format!(
-        "the same {} cases in both, compared one by one; {} valid in both, {} no longer valid, {} newly \
-         valid",
+        "paired comparison of the same {} cases: {} valid in both, {} valid only in A, {} valid only in B",
         paired.cases, paired.layouts, paired.became_invalid, paired.became_valid
     )];
-    lines.extend(transition_text("layouts that work", &paired.working));
+    lines.extend(transition_text("feasible layouts", &paired.working));
     for each in &paired.configurations {
         lines.extend(transition_text(&each.label, &each.success));
     }
-    // What is said of several configurations is said once, with their names.
+    // A sentence that is the same for several configurations appears once, with their names.
     let mut said: Vec<(String, Vec<&str>)> = Vec::new();
     for each in &paired.differences {
         let largest = [("worse", &each.losses), ("better", &each.gains)];
@@ -78,7 +75,7 @@ fn paired_lines(paired: &Paired) -> Vec<String> {
                 continue;
             };
             let sentence = format!(
-                "{}: case {} {way} by {}; on average {} (B less A, {} layouts)",
+                "{}: case {} {way} by {}; mean {} (B minus A, {} layouts)",
                 each.words,
                 first.case,
                 value_text(first.value, &each.unit),
@@ -108,7 +105,7 @@ pub(crate) fn intro(comparison: &StudyComparison) -> Vec<String> {
     lines.extend(comparison.notes.iter().map(|note| format!("note: {note}")));
     if let Some(reason) = &comparison.unpaired_because {
         lines.push(format!(
-            "not the same cases ({reason}): rates and quantiles are compared, by their 95 % intervals"
+            "cases differ ({reason}): rates and quantiles are compared by their 95 % CI"
         ));
     }
     if let Some(paired) = &comparison.paired {
@@ -117,7 +114,7 @@ pub(crate) fn intro(comparison: &StudyComparison) -> Vec<String> {
     lines
 }
 
-/// What, A, B, change, and how sure.
+/// Quantity, A, B, change, and whether it is significant.
 pub(crate) fn row(change: &Change) -> [String; 5] {
     let text =
         |value: Option<f64>| value.map_or("-".to_owned(), |value| value_text(value, &change.unit));
@@ -128,7 +125,7 @@ pub(crate) fn row(change: &Change) -> [String; 5] {
         (true, false) => "better",
     };
     let sure = if is_changed(change) && !change.beyond_chance {
-        " (or chance)"
+        " (not significant)"
     } else {
         ""
     };
@@ -159,7 +156,7 @@ pub(crate) fn failure_text(failure: &StudyFailure) -> String {
     }
 }
 
-/// Rates and quantiles that one screen lists; of more the number is said.
+/// Rates and quantiles that one screen lists; further ones are counted.
 const MOST_LISTED: usize = 16;
 
 /// How much of a comparison is printed.
@@ -169,7 +166,7 @@ pub enum Listed {
     Screen,
     /// All that changed.
     Changed,
-    /// What did not change too.
+    /// All, including what did not change.
     All,
 }
 
@@ -184,7 +181,7 @@ pub fn study_comparison_text(comparison: &StudyComparison, listed: Listed) -> St
     let same = comparison.changes.len() - rows.len();
     let mut more = 0;
     if listed == Listed::Screen && rows.len() > MOST_LISTED {
-        // What is worse beyond chance first, then what is better, then what may be chance.
+        // Significantly worse first, then significantly better, then what is not significant.
         rows.sort_by_key(|change| {
             (
                 !change.beyond_chance,
@@ -195,7 +192,7 @@ pub fn study_comparison_text(comparison: &StudyComparison, listed: Listed) -> St
         rows.truncate(MOST_LISTED);
     }
     if !rows.is_empty() {
-        let mut table = plain_table(&["what", "A", "B", "B less A", ""]);
+        let mut table = plain_table(&["quantity", "A", "B", "B minus A", ""]);
         for change in rows {
             let [what, a, b, difference, outcome] = row(change);
             let right = |text: String| Cell::new(text).set_alignment(CellAlignment::Right);
@@ -215,22 +212,22 @@ pub fn study_comparison_text(comparison: &StudyComparison, listed: Listed) -> St
         lines.push(table.to_string());
     }
     if more > 0 {
-        lines.push(format!("and {more} more that changed: --wide"));
+        lines.push(format!("{more} more changes: --wide"));
     }
     if !all {
-        lines.push(format!("{same} rates and quantiles are the same"));
+        lines.push(format!("{same} rates and quantiles unchanged"));
     }
     lines.push(String::new());
     for threshold in comparison.thresholds.iter().filter(|each| each.pass) {
         lines.push(format!(
-            "allowed {} = {}: {}",
+            "threshold {} = {}: {}",
             threshold.threshold, threshold.limit, threshold.detail
         ));
     }
     lines.join("\n").trim_end().to_owned()
 }
 
-/// The verdict in a line: what was lost, and how many rates and quantiles changed.
+/// The verdict in a line: regressions, and how many rates and quantiles changed.
 pub(crate) fn verdict(comparison: &StudyComparison) -> String {
     let beyond = |worse: bool| {
         let changes = shown(comparison, false).into_iter();
@@ -239,12 +236,12 @@ pub(crate) fn verdict(comparison: &StudyComparison) -> String {
             .count()
     };
     let (word, losses) = match comparison.failures.len() {
-        0 => ("PASS", "nothing was lost beyond what is allowed".to_owned()),
-        1 => ("FAIL", "1 loss".to_owned()),
-        count => ("FAIL", format!("{count} losses")),
+        0 => ("PASS", "no regression beyond the thresholds".to_owned()),
+        1 => ("FAIL", "1 regression".to_owned()),
+        count => ("FAIL", format!("{count} regressions")),
     };
     format!(
-        "{word}: {losses}; {} rates and quantiles, beyond chance {} worse and {} better",
+        "{word}: {losses}; {} rates and quantiles: {} significantly worse, {} significantly better",
         comparison.changes.len(),
         beyond(true),
         beyond(false)

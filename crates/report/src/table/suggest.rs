@@ -1,4 +1,4 @@
-//! Proposals as tables, with what to paste.
+//! Proposals as tables, with the keys to paste.
 
 use std::fmt::Write;
 
@@ -8,14 +8,13 @@ use needlebench_bench::suggest::{
 };
 
 use needlebench_cell::{part_in_words, reason_in_words};
-
-use super::plain_table;
+use needlebench_show::plain_table;
 
 /// Entries for a target.
 pub fn entries_text(found: &EntrySearch) -> String {
     let base = found.base_position_m.map(|m| format!("{:.0}", m * 1e3));
     let mut text = format!(
-        "entries for {}, the base at [{}] mm ({})\n",
+        "entries for {}, base at [{}] mm ({})\n",
         found.goal,
         base.join(", "),
         found.basis
@@ -23,7 +22,7 @@ pub fn entries_text(found: &EntrySearch) -> String {
     let [x, y, z] = found.target_in_phantom_m.map(|m| m * 1e3);
     let _ = writeln!(
         text,
-        "target [{x:.1}, {y:.1}, {z:.1}] mm; {} of {} directions have an allowed route{}",
+        "target [{x:.1}, {y:.1}, {z:.1}] mm; {} of {} directions have an admissible path{}",
         found.allowed,
         found.tried,
         counts(&found.refused, |each| {
@@ -45,13 +44,13 @@ pub fn entries_text(found: &EntrySearch) -> String {
         .map(|tissue| format!("{tissue}\n(mm)"))
         .collect();
     header.extend(headings.iter().map(String::as_str));
-    header.extend(["works", "score\nof 100"]);
+    header.extend(["feasible", "score\nof 100"]);
     let is_planned = found
         .entries
         .iter()
         .any(|each| each.working_planned.is_some());
     if is_planned {
-        header.insert(header.len() - 1, "with a\nmotion");
+        header.insert(header.len() - 1, "with\nmotion");
     }
     let mut table = plain_table(&header);
     for (index, entry) in found.entries.iter().enumerate() {
@@ -73,7 +72,7 @@ pub fn entries_text(found: &EntrySearch) -> String {
         let fails = entry.configurations.iter().filter(|each| !each.works);
         let fails: Vec<String> = fails.map(why_not).collect();
         if !fails.is_empty() {
-            let _ = write!(text, "\n# fails: {}", fails.join(", "));
+            let _ = write!(text, "\n# infeasible: {}", fails.join(", "));
         }
         let _ = writeln!(text, "\n{}", entry.toml);
     }
@@ -108,10 +107,10 @@ fn why_not(each: &ConfigurationPreview) -> String {
     format!("{} ({})", each.label, reason_in_words(each.reason()))
 }
 
-/// Places of the robot's base.
+/// Base placements of the robot.
 pub fn places_text(found: &PlaceSearch) -> String {
     let mut text = format!(
-        "places of the base for {} ({})\n{} of {} places serve {}{}\n",
+        "base placements for {} ({})\n{} of {} placements feasible for {}{}\n",
         found.goals.join(", "),
         found.basis,
         found.allowed,
@@ -132,11 +131,11 @@ pub fn places_text(found: &PlaceSearch) -> String {
         .iter()
         .flat_map(|place| &place.goals)
         .any(|goal| goal.working_planned.is_some());
-    let mut header = vec!["", "position (mm)", "yaw\n(deg)", "goal", "works"];
+    let mut header = vec!["", "position (mm)", "yaw\n(deg)", "goal", "feasible"];
     if is_planned {
-        header.push("with a\nmotion");
+        header.push("with\nmotion");
     }
-    header.extend(["arm clear\n(mm)", "clearest"]);
+    header.extend(["arm\nclearance (mm)", "best\nconfiguration"]);
     let mut table = plain_table(&header);
     let present = found.present.iter().map(|place| ("now".to_owned(), place));
     let proposed = found.places.iter().enumerate();
@@ -164,7 +163,8 @@ pub fn places_text(found: &PlaceSearch) -> String {
     }
     let _ = writeln!(
         text,
-        "{table}\nordered by the goal with fewest configurations, then by how clear the arm is in its\nclearest one of patient, table, gantry, mount and obstacles; run ranks by all that it measures"
+        "{table}\nsorted by feasible configurations of the worst goal, then by arm clearance from \
+         patient, table, gantry, mount and obstacles; `run` ranks by all metrics"
     );
     for (index, place) in found.places.iter().enumerate() {
         let _ = writeln!(text, "\n# {}\n[robot]\n{}", index + 1, place.toml);
@@ -177,11 +177,11 @@ fn counts(refused: &[Refused], words: impl Fn(&Refused) -> String) -> String {
     const MOST: usize = 6;
     let mut text = String::new();
     for each in refused.iter().take(MOST) {
-        let _ = write!(text, "\n  {:5} refused: {}", each.count, words(each));
+        let _ = write!(text, "\n  {:5} rejected: {}", each.count, words(each));
     }
     let others: usize = refused.iter().skip(MOST).map(|each| each.count).sum();
     if others > 0 {
-        let _ = write!(text, "\n  {others:5} refused: others");
+        let _ = write!(text, "\n  {others:5} rejected: others");
     }
     text
 }

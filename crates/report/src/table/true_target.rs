@@ -1,11 +1,11 @@
-//! How far the needle ends from where the lesion really is, in a sentence.
+//! Distance of the needle from the true lesion position, in a sentence.
 
 use needlebench_evaluation::metric::Metric;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 
 use super::budget::mm;
 
-/// Distances of a configuration's needle from the true target, the tip's and across the needle: simulated,
+/// Distances of a configuration's needle from the true target, of the tip and lateral: simulated,
 /// or predicted where no engine ran.
 fn distances_m(configuration: &ConfigurationReport) -> Option<[f64; 2]> {
     let read = |keys: [&str; 2]| {
@@ -18,8 +18,8 @@ fn distances_m(configuration: &ConfigurationReport) -> Option<[f64; 2]> {
     ])
 }
 
-/// Of the recommended configuration, or from the least to the most of those that were measured; none where it is not
-/// known where the lesion really is.
+/// Of the recommended configuration, or from the least to the most of those that were measured; none where the true
+/// lesion position is unknown.
 pub(crate) fn true_target_in_words(goal: &GoalReport) -> Option<String> {
     let chosen = goal.recommended.as_ref().map(|found| found.label.as_str());
     let measured = goal.configurations.iter().filter(|each| {
@@ -36,7 +36,5 @@ pub(crate) fn true_target_in_words(goal: &GoalReport) -> Option<String> {
         })
     };
     let (tip, across) = (range(0)?, range(1)?);
-    Some(format!(
-        "true lesion: tip {tip} off, {across} across the needle"
-    ))
+    Some(format!("true lesion: tip error {tip}, lateral {across}"))
 }

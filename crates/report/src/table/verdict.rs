@@ -1,12 +1,12 @@
-//! How many criteria were judged, how many of them met, and what was not judged.
+//! How many criteria were evaluated, how many of them met, and what was not evaluated.
 
 use needlebench_evaluation::EXPECTED;
 use needlebench_evaluation::report::{
     ConfigurationReport, CriterionResult, NotJudged, Report, Status, Verdict,
 };
 
-/// A run's verdict with its counts: `117 of 117 criteria met`, or `63 of 117 criteria judged, all met;
-/// not judged: 54 (mujoco did not measure it: 48; ...)`.
+/// A run's verdict with its counts: `117 of 117 criteria met`, or `63 of 117 criteria evaluated, all met;
+/// not evaluated: 54 (not measured by mujoco: 48; ...)`.
 pub(crate) fn counts(report: &Report) -> String {
     let judged = report.criteria.len();
     let missed = report.criteria.iter().filter(|each| !each.pass).count();
@@ -17,7 +17,7 @@ pub(crate) fn counts(report: &Report) -> String {
         .count();
     let expected = match expected {
         0 => String::new(),
-        count => format!(", {count} missed as the scenario expects"),
+        count => format!(", {count} failed as expected by the scenario"),
     };
     let unjudged = report.not_judged.len();
     if unjudged == 0 {
@@ -29,12 +29,27 @@ pub(crate) fn counts(report: &Report) -> String {
     };
     let reasons = reasons(&report.not_judged);
     format!(
-        "{judged} of {} criteria judged, {met}; not judged: {unjudged} ({reasons})",
+        "{judged} of {} criteria evaluated, {met}; not evaluated: {unjudged} ({reasons})",
         judged + unjudged
     )
 }
 
-/// Whether a criterion is missed by a configuration of which the scenario expects that it fails.
+/// Whether a note qualifies the verdict: what was assumed, omitted or replaced. Every report prints it beside the
+/// verdict.
+pub(crate) fn qualifies(note: &str) -> bool {
+    note.starts_with("assumed, since")
+        || note.starts_with(needlebench_bench::LEFT_OUT)
+        || note.starts_with(needlebench_robot::WITHOUT_SHAPE)
+        || note.contains(needlebench_robot::STANDS_FOR_IT)
+}
+
+/// The notes of a report that qualify its verdict.
+pub(crate) fn qualifying(report: &Report) -> impl Iterator<Item = &str> {
+    let notes = report.notes.iter().map(String::as_str);
+    notes.filter(|note| qualifies(note))
+}
+
+/// Whether a configuration fails a criterion as the scenario expects.
 pub(crate) fn missed_as_expected(report: &Report, result: &CriterionResult) -> bool {
     !result.pass
         && result.label.is_some()
@@ -46,7 +61,7 @@ pub(crate) fn missed_as_expected(report: &Report, result: &CriterionResult) -> b
         })
 }
 
-/// Why criteria were not judged, each reason once with how many criteria it is of.
+/// Why criteria were not evaluated, each reason once with the number of criteria.
 fn reasons(all: &[NotJudged]) -> String {
     let mut counted: Vec<(&str, usize)> = Vec::new();
     for each in all {
@@ -73,8 +88,8 @@ pub(crate) fn capitals(verdict: Verdict) -> &'static str {
     }
 }
 
-/// What became of a configuration: its status, `incomplete` where criteria on it are not judged and none is
-/// known to be missed.
+/// Outcome of a configuration: its status, `incomplete` where criteria on it are not evaluated and none is known
+/// to fail.
 pub(crate) fn status(report: &Report, goal: &str, each: &ConfigurationReport) -> &'static str {
     let mut of_it = report
         .criteria

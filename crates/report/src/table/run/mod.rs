@@ -5,8 +5,7 @@ mod screen;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use comfy_table::{Cell, CellAlignment, Color};
-use needlebench_cell::{part_in_words, rule_in_words};
+use needlebench_cell::{Rule, part_in_words, rule_in_words};
 use needlebench_engine::Engine;
 use needlebench_evaluation::excitation;
 use needlebench_evaluation::iso9283::SUBJECT;
@@ -14,7 +13,8 @@ use needlebench_evaluation::metric::Heading;
 use needlebench_evaluation::report::{
     ConfigurationReport, CriterionResult, GoalReport, RejectionReport, Report, RouteReport, Status,
 };
-use needlebench_planning::Rule;
+use needlebench_show::number::value_and_limit;
+use needlebench_show::{Cell, CellAlignment, Color, Table, layout, plain_table};
 use needlebench_uncertainty::budget::ErrorBudget;
 
 use super::budget::{ALLOWED_M, CLINICAL_LATERAL_M, CLINICAL_M, budget_text, budgets, mm};
@@ -24,9 +24,6 @@ use super::ranking::comparison_text;
 use super::shown::{Shown, shown_metrics};
 use super::true_target::true_target_in_words;
 use super::verdict::{capitals, counts, missed_as_expected, status};
-use super::{Table, plain_table};
-use crate::layout;
-use crate::number::value_and_limit;
 
 pub use screen::report_screen;
 
@@ -52,7 +49,7 @@ fn write_report(
             "{}",
             goal_table(report, goal, &differing, Mostly::Shown)
         )?;
-        writeln!(out, "* worst of those that work, < recommended")?;
+        writeln!(out, "* worst of the feasible configurations, < recommended")?;
         write_constant(out, goal, &constant)?;
         write_expected(out, report, goal)?;
         let mut checks = columns(&headings, |heading| heading.engines);
@@ -62,18 +59,14 @@ fn write_report(
             .iter()
             .any(|each| !each.engines.is_empty())
         {
-            writeln!(
-                out,
-                "what the engines leave of the motion, {}",
-                simulated_arm(report)
-            )?;
+            writeln!(out, "simulation residuals of {}", simulated_arm(report))?;
             writeln!(out, "{}", goal_table(report, goal, &checks, Mostly::Left))?;
         }
         if let Some(comparison) = comparison_text(goal) {
             writeln!(out, "{comparison}")?;
         }
         if goal.configurations.iter().any(|each| each.room.is_some()) {
-            writeln!(out, "room for people, in the final posture")?;
+            writeln!(out, "free space and line of sight, final posture")?;
             writeln!(out, "{}", room_table(goal))?;
         }
         if let Some(events) = events_text(goal) {
@@ -90,7 +83,7 @@ fn write_report(
         if let Some(table) = super::referee::referee_table(goal) {
             writeln!(
                 out,
-                "each engine beside the referee: distance of the needle's tips"
+                "engines compared with the reference integrator: distance between the needle tips"
             )?;
             writeln!(out, "{table}")?;
         }
@@ -119,8 +112,8 @@ fn write_report(
     for each in &report.enclosure {
         writeln!(
             out,
-            "enclosing primitives of {}: {:.2} mm off its mesh on average, {:.2} mm at most; the \
-             mesh reaches {:.2} mm out of them",
+            "enclosing primitives of {}: mean distance from the mesh {:.2} mm, maximum {:.2} mm; \
+             mesh protrudes by up to {:.2} mm",
             each.link,
             each.mean_overhang_m * 1e3,
             each.worst_overhang_m * 1e3,
@@ -139,10 +132,10 @@ fn goal_heading(goal: &GoalReport) -> String {
         .as_ref()
         .map_or(String::new(), |name| format!(", lesion {name}"));
     let standoff = goal.standoff_m.map_or(String::new(), |standoff_m| {
-        format!(", guide {:.1} mm off the skin", standoff_m * 1e3)
+        format!("; guide stand-off {:.1} mm", standoff_m * 1e3)
     });
     format!(
-        "\ngoal {}{lesion}: needle {:.1} mm beyond the guide{standoff}",
+        "\ngoal {}{lesion}: needle extends {:.1} mm beyond the guide{standoff}",
         goal.name,
         goal.insertion_length_m * 1e3
     )
@@ -195,7 +188,7 @@ fn own_pair(goal: &GoalReport) -> Option<[&str; 2]> {
     pairs.all(|pair| pair == first).then_some(first)
 }
 
-/// How near the arm comes to itself by its build, in words; `pair` is that of [`own_pair`].
+/// Self-clearance inherent in the arm, in words; `pair` is that of [`own_pair`].
 fn own_pair_in_words(goal: &GoalReport, [a, b]: [&str; 2]) -> Option<String> {
     let all = goal.configurations.iter();
     let sizes = all.filter_map(|each| Some(each.clearance.classes.get("self")?.minimum_m * 1e3));
@@ -205,7 +198,7 @@ fn own_pair_in_words(goal: &GoalReport, [a, b]: [&str; 2]) -> Option<String> {
     })?;
     let [a, b] = [a, b].map(part_in_words);
     Some(format!(
-        "the arm's own {a} and {b} are {least:.1} to {most:.1} mm apart by its build"
+        "self-clearance {least:.1} to {most:.1} mm ({a} to {b}), inherent in the arm"
     ))
 }
 
@@ -231,22 +224,22 @@ fn write_constant(out: &mut String, goal: &GoalReport, constant: &[Column]) -> s
     if parts.is_empty() {
         return Ok(());
     }
-    writeln!(out, "the same in all: {}", parts.join("; "))
+    writeln!(out, "identical for all: {}", parts.join("; "))
 }
 
-/// What arm and patient the expected tip errors are of, and what they compare with.
+/// Arm and patient population of the RMS tip errors, and published values to compare with.
 fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::fmt::Result {
     let Some(expected) = &report.expected else {
         return Ok(());
     };
-    let arm = expected.arm.map_or("the arm", |arm| arm);
+    let arm = expected.arm.map_or(String::new(), |arm| format!("{arm}: "));
     let breath = match expected.breath {
-        "free" => "breathes freely",
-        _ => "holds the breath",
+        "free" => "free breathing",
+        _ => "breath-hold",
     };
     writeln!(
         out,
-        "tip error: expected over all arms and patients ({arm}): {}; the patient {breath}",
+        "tip error: RMS over the arm and patient population ({arm}{}); {breath}",
         expected.arm_in_words
     )?;
     let budgets = budgets(goal);
@@ -268,13 +261,14 @@ fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::
             .find(|each| each.criterion == "max_tip_rms_mm")
             .and_then(|each| each.limit);
         let judged = limit_m.map_or_else(
-            || "which nothing here judges: `max_tip_rms_mm` under [criteria] would".to_owned(),
+            || "not checked; set `max_tip_rms_mm` under [criteria] to check it".to_owned(),
             |limit_m| format!("`max_tip_rms_mm` here {} mm", mm(limit_m)),
         );
         writeln!(
             out,
-            "published needle robots: across the needle before it goes in {} to {} mm, here {before}; at the target \
-             {} to {} mm, here {after}; radiologists allow {} mm, {judged}",
+            "published needle robots: lateral error before insertion {} to {} mm (here {before}), \
+             tip error at the target {} to {} mm (here {after}); accepted by radiologists {} mm, \
+             {judged}",
             mm(CLINICAL_LATERAL_M[0]),
             mm(CLINICAL_LATERAL_M[1]),
             mm(CLINICAL_M[0]),
@@ -285,22 +279,21 @@ fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::
     Ok(())
 }
 
-/// Which arm the engines have simulated.
+/// The arm that the engines simulated.
 fn simulated_arm(report: &Report) -> &'static str {
     let of_class = report.expected.as_ref();
     let of_class = of_class.is_some_and(|expected| expected.arm.is_some());
     if report.truth.is_some() && of_class {
         // Without [imperfections] of its own.
-        "with the nominal arm under another gravity than its controller believes in"
+        "the arm without imperfections, whose controller assumes another gravity"
     } else if report.truth.is_some() {
-        "with the one arm and patient that the seed draws"
+        "the arm and patient sampled by the seed"
     } else {
-        "with an arm that is just what its controller believes: errors of control and integration alone, nothing of \
-         a real arm's accuracy"
+        "the arm without imperfections: control and integration errors only, not the accuracy of a real arm"
     }
 }
 
-/// Whether the source that most of the expected tip error is by has a column.
+/// Whether the main source of the RMS tip error has a column.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Mostly {
     Shown,
@@ -318,7 +311,7 @@ fn goal_table(report: &Report, goal: &GoalReport, columns: &[Column], mostly: Mo
     let mut header = vec!["configuration", "status"];
     header.extend(columns.iter().map(|column| column.heading.as_str()));
     if mostly {
-        header.push("mostly\nby");
+        header.push("main\nsource");
     }
     let mut table = plain_table(&header);
     let worst: Vec<Option<f64>> = columns
@@ -374,7 +367,7 @@ fn goal_table(report: &Report, goal: &GoalReport, columns: &[Column], mostly: Mo
     table
 }
 
-/// What each configuration leaves to people; `-` without a posture.
+/// Free space, lines of sight and hand cone of each configuration; `-` without a posture.
 fn room_table(goal: &GoalReport) -> Table {
     let rooms = || {
         goal.configurations
@@ -392,14 +385,14 @@ fn room_table(goal: &GoalReport) -> Table {
     });
     let mut header = vec!["configuration".to_owned(), "free\n(%)".to_owned()];
     header.extend(regions.iter().map(|region| format!("\n{region}")));
-    header.push("sight\n(%)".to_owned());
+    header.push("line of\nsight (%)".to_owned());
     header.extend(people);
     header.extend(
         [
             "hand cone\n(deg)",
             "blocked\nby",
             "elbow",
-            "over entry\n(mm)",
+            "elbow above\nentry (mm)",
         ]
         .map(str::to_owned),
     );
@@ -448,7 +441,7 @@ fn percent(fraction: f64) -> String {
     format!("{:.0}", 100.0 * fraction)
 }
 
-/// The worst value of a column, if the configurations that work differ in it at all.
+/// The worst value of a column, if the feasible configurations differ in it at all.
 fn worst_of(goal: &GoalReport, column: &Column) -> Option<f64> {
     /// Relative spread below which no value is worse than another.
     const SPREAD: f64 = 0.01;
@@ -471,7 +464,7 @@ fn worst_of(goal: &GoalReport, column: &Column) -> Option<f64> {
     })
 }
 
-/// Criteria on a goal, or on what stands in its place, that were not met.
+/// Failed criteria of a goal, or of what is in its place.
 fn write_missed(out: &mut String, report: &Report, goal: &str) -> std::fmt::Result {
     for result in report
         .criteria
@@ -479,7 +472,7 @@ fn write_missed(out: &mut String, report: &Report, goal: &str) -> std::fmt::Resu
         .filter(|result| result.goal == goal && !result.pass)
     {
         let word = if missed_as_expected(report, result) {
-            "missed as expected:"
+            "failed as expected:"
         } else {
             "FAILED"
         };
@@ -488,7 +481,7 @@ fn write_missed(out: &mut String, report: &Report, goal: &str) -> std::fmt::Resu
     Ok(())
 }
 
-/// A criterion that was not met: of what, value and limit.
+/// A failed criterion: of what, value and limit.
 fn missed_in_words(result: &CriterionResult) -> String {
     let measured = result.value.zip(result.limit).map(|(value, limit)| {
         let (value, limit) = value_and_limit(value, limit, result.unit);
@@ -512,8 +505,8 @@ fn missed_in_words(result: &CriterionResult) -> String {
     parts.join(" ")
 }
 
-/// Why configurations cannot work, a sentence for each reason with all that it holds for; of each its label and the
-/// first rule that it breaks.
+/// Why configurations are infeasible, a sentence for each reason with all that it holds for; of each its label and the
+/// first rule that it violates.
 pub fn rejected_in_words<'r>(
     rejected: impl Iterator<Item = (&'r str, &'r RejectionReport)>,
 ) -> Vec<String> {
@@ -532,58 +525,65 @@ pub fn rejected_in_words<'r>(
         .collect()
 }
 
-/// By how much a rule is broken; of some it is no number.
+/// By how much a rule is violated; of some it is no number.
 fn by_how_much(rejection: &RejectionReport) -> String {
     let is_rule = |rule: Rule| rejection.rule == rule.name();
     let (value, limit) = value_and_limit(rejection.value, rejection.limit, rejection.unit);
     if is_rule(Rule::Merged) {
         String::new()
     } else if is_rule(Rule::Unreachable) {
-        format!(" ({value} short)")
-    } else if is_rule(Rule::Collision) {
-        let (depth, _) = value_and_limit(-rejection.value, rejection.limit, rejection.unit);
-        format!(" ({depth} deep, {limit} to keep)")
-    } else if is_rule(Rule::TooClose) {
-        format!(" ({value} left, {limit} to keep)")
-    } else {
+        format!(" (by {value})")
+    } else if is_rule(Rule::Singular) || is_rule(Rule::JointLimit) || is_rule(Rule::NearestOnly) {
         format!(" ({value}, limit {limit})")
+    } else if is_rule(Rule::Approach) {
+        format!(" ({value}, {limit} required)")
+    } else if rejection.value < 0.0 {
+        let (depth, _) = value_and_limit(-rejection.value, rejection.limit, rejection.unit);
+        let required = if rejection.limit > 0.0 {
+            format!(", clearance {limit} required")
+        } else {
+            String::new()
+        };
+        format!(" (penetration {depth}{required})")
+    } else {
+        format!(" (clearance {value}, {limit} required)")
     }
 }
 
-/// How the planned needle keeps away from what it must not meet, in a sentence.
+/// Clearance of the planned needle path from bone, vessels and organs, in a sentence.
 ///
-/// `wanted_m` is what a criterion asks for, of which and the margin the larger has to be kept.
+/// `wanted_m` is the limit of a criterion; the larger of it and the margin is required.
 pub fn route_in_words(route: &RouteReport, wanted_m: Option<f64>) -> String {
     let mm = 1e3 * route.distance_m;
     let RouteReport { part, tissue, .. } = route;
     let part = part_in_words(part);
     let where_it_goes = if mm < 0.0 {
-        format!("{:.1} mm deep through {part} ({tissue})", -mm)
+        format!("{:.1} mm deep in {part} ({tissue})", -mm)
     } else {
-        format!("{mm:.1} mm from {part} ({tissue})")
+        format!("{mm:.1} mm clearance to {part} ({tissue})")
     };
     format!(
-        "needle route{}: {where_it_goes}, to keep {:.1} mm",
-        if route.kept { "" } else { " REFUSED" },
+        "needle path{}: {where_it_goes}, {:.1} mm required",
+        if route.kept { "" } else { " REJECTED" },
         1e3 * wanted_m.map_or(route.margin_m, |wanted_m| wanted_m.max(route.margin_m))
     )
 }
 
-/// What a criterion asks of a goal's needle, m.
+/// Clearance that a criterion requires of a goal's needle path, m.
 pub(crate) fn route_wanted_m(report: &Report, goal: &GoalReport) -> Option<f64> {
     let of_goal = report.criteria.iter().filter(|each| each.goal == goal.name);
     let mut of_route = of_goal.filter(|each| each.criterion == "min_clearance_mm.needle_route");
     of_route.find_map(|each| each.limit)
 }
 
-/// What crossing fissures means, in a sentence; nothing where none is crossed.
+/// Fissures that the needle crosses, with the odds ratio; nothing where none is crossed.
 pub fn fissures_in_words(crossed: &[String]) -> Option<String> {
     /// Odds of a pneumothorax against those of needles that cross none: meta-analysis of 23 104 patients
     /// (Br J Radiol 2020, PMC7362905).
     const ODDS: f64 = 3.75;
     (!crossed.is_empty()).then(|| {
         format!(
-            "needle crosses {}: the odds of a pneumothorax are {ODDS} times those without",
+            "needle crosses {} (pneumothorax odds ratio {ODDS})",
             crossed
                 .iter()
                 .map(|name| part_in_words(name))
@@ -604,7 +604,8 @@ pub(crate) fn margin_in_words(configuration: &ConfigurationReport) -> Option<Str
     if let Some(straight) = &margin.straight {
         let end_s = configuration.motion.last().map_or(0.0, |phase| phase.end_s);
         words.push(format!(
-            "goes around: {:.1} mm instead of {:.1} mm, in {:.1} s instead of {:.1} s",
+            "alternative path: clearance {:.1} mm instead of {:.1} mm, duration {:.1} s instead of \
+             {:.1} s",
             1e3 * straight.instead_m,
             1e3 * straight.clearance_m,
             end_s,
@@ -619,8 +620,8 @@ pub(crate) fn margin_in_words(configuration: &ConfigurationReport) -> Option<Str
             .min_by(|(_, a), (_, b)| a.achieved_m.total_cmp(&b.achieved_m));
         if let Some((class, each)) = short {
             words.push(format!(
-                "its transfer keeps {:.1} mm of the {:.1} mm attainable ({class}): the search ended by \
-                 `motion_checks`, a better way may exist",
+                "transit clearance {:.1} mm of {:.1} mm attainable ({class}); `motion_checks` \
+                 exhausted, a better path may exist",
                 1e3 * each.achieved_m,
                 1e3 * each.attainable_m
             ));
@@ -645,12 +646,12 @@ fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::f
     }
     for configuration in &goal.configurations {
         if let Some(rejection) = configuration.rejections.first() {
-            let (value, limit) = value_and_limit(rejection.value, rejection.limit, rejection.unit);
             writeln!(
                 out,
-                "{}: {}: {value} (limit {limit}): {}",
+                "{}: {}{}: {}",
                 configuration.label,
                 rule_in_words(rejection.rule),
+                by_how_much(rejection),
                 rejection.detail
             )?;
         }
@@ -663,6 +664,9 @@ fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::f
     write_missed(out, report, &goal.name)?;
     match &goal.recommended {
         Some(found) => writeln!(out, "recommended: {} - {}", found.label, found.reason),
-        None => writeln!(out, "recommended: none, no configuration works"),
+        None => writeln!(
+            out,
+            "recommended: none, no configuration is feasible and meets the criteria"
+        ),
     }
 }

@@ -1,30 +1,28 @@
-//! What a run prints unless all tables are wanted: one screen.
+//! What a run prints unless all tables are requested: one screen.
 //!
-//! The verdict comes first, then the recommendation with its reason, then what differs between the
-//! configurations that work; what is the same for all is said once.
+//! The verdict comes first, then the recommendation with its reason, then what differs between the feasible
+//! configurations; what is identical for all is printed once.
 
 use std::fmt::Write;
 
-use comfy_table::{Cell, CellAlignment, Color};
 use needlebench_cell::rule_in_words;
 use needlebench_engine::Engine;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status};
+use needlebench_show::number::millimetres;
+use needlebench_show::{Cell, CellAlignment, Color, Table, layout, plain_table};
 
 use super::{
     fissures_in_words, goal_heading, missed_in_words, rejected_in_words, route_in_words,
     route_wanted_m, write_expected,
 };
-use crate::layout;
-use crate::number::millimetres;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::events::events_in_words;
-use crate::table::plain::{Table, plain_table};
 use crate::table::ranking::words;
 use crate::table::shown::shown_metrics;
 use crate::table::true_target::true_target_in_words;
-use crate::table::verdict::{capitals, counts, missed_as_expected, status};
+use crate::table::verdict::{capitals, counts, missed_as_expected, qualifies, status};
 
-/// Missed criteria that are listed; of more the number is said.
+/// Failed criteria that are listed; of more, the number is printed.
 const MOST_MISSED: usize = 8;
 /// Width of a goal's column among those of other goals.
 const GOAL_WIDTH: usize = 13;
@@ -60,39 +58,26 @@ fn write_screen(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         out.push_str(&crate::table::excitation::report_text(excitation));
     }
     // What was chosen for the user, and what is not as a standard has it, is not for another screen.
-    let (told, others): (Vec<&String>, Vec<&String>) =
-        report.notes.iter().partition(|note| is_told(report, note));
+    let (told, others): (Vec<&String>, Vec<&String>) = report
+        .notes
+        .iter()
+        .partition(|note| report.iso9283.is_some() || qualifies(note));
     for note in told {
         writeln!(out, "note: {note}")?;
     }
     let notes = others.len();
     if notes > 0 {
-        let (notes_are, they) = if notes == 1 {
-            ("note is", "it")
+        let (noun, they) = if notes == 1 {
+            ("note", "it")
         } else {
-            ("notes are", "them")
+            ("notes", "them")
         };
-        writeln!(
-            out,
-            "{notes} {notes_are} in the report; --wide prints {they} with all tables"
-        )?;
+        writeln!(out, "{notes} {noun} in the report (--wide prints {they})")?;
     }
     Ok(())
 }
 
-/// End of the note on a link that another shape stands for.
-const STANDS_FOR_IT: &str = " stand for it";
-
-/// Whether a note is said on the first screen.
-fn is_told(report: &Report, note: &str) -> bool {
-    report.iso9283.is_some()
-        || note.starts_with("assumed, since")
-        || note.starts_with(needlebench_bench::LEFT_OUT)
-        || note.starts_with(needlebench_cell::WITHOUT_SHAPE)
-        || note.contains(STANDS_FOR_IT)
-}
-
-/// Criteria that were missed, and engines that failed.
+/// Failed criteria and failed engines.
 fn write_failures(out: &mut String, report: &Report) -> std::fmt::Result {
     let missed: Vec<String> = report
         .criteria
@@ -128,7 +113,10 @@ fn write_goal(
 ) -> std::fmt::Result {
     match &goal.recommended {
         Some(found) => writeln!(out, "recommended: {} - {}", found.label, found.summary)?,
-        None => writeln!(out, "recommended: none, no configuration works")?,
+        None => writeln!(
+            out,
+            "recommended: none, no configuration is feasible and meets the criteria"
+        )?,
     }
     writeln!(out, "{}", goal_heading(goal))?;
     let rows = rows(goal);
@@ -137,10 +125,10 @@ fn write_goal(
         let (shown, left) = that_fit(report, goal, &rows, differing);
         writeln!(out, "{}", goal_table(report, goal, &rows, &shown))?;
         if rows.len() > 1 && !constant.is_empty() {
-            writeln!(out, "the same for all: {}", constant.join("; "))?;
+            writeln!(out, "identical for all: {}", constant.join("; "))?;
         }
         if !left.is_empty() {
-            writeln!(out, "further columns with --wide: {}", left.join(", "))?;
+            writeln!(out, "more columns with --wide: {}", left.join(", "))?;
         }
     }
     write_rejected(out, goal)?;
@@ -246,7 +234,7 @@ fn split(
     columns.extend(
         shown_metrics(engines, |heading| heading.summary).filter_map(|(_, shown)| {
             let (heading, urgency) = match shown.metric().family {
-                "sight_fraction" => ("sight", 5),
+                "sight_fraction" => ("line of\nsight", 5),
                 "free_fraction" => ("free\nspace", 6),
                 "hand_cone" => ("hand cone\n(deg)", 7),
                 _ => return None,
@@ -265,8 +253,8 @@ fn split(
     let mut same: Vec<String> = same.collect();
     let mut differing = differing;
     if let Some(pair) = own_pair {
-        // How near the arm is to itself is how it is built.
-        let of_itself = |column: &Column| column.name().starts_with("arm to itself");
+        // Self-clearance is inherent in the arm.
+        let of_itself = |column: &Column| column.name().starts_with("self-clearance");
         if differing.iter().any(of_itself) {
             differing.retain(|column| !of_itself(column));
             same.extend(super::own_pair_in_words(goal, pair));
@@ -364,14 +352,14 @@ fn state(status: &str) -> Cell {
     }
 }
 
-/// Configurations that cannot work, those with the same reason together.
+/// Infeasible configurations, those with the same reason together.
 fn write_rejected(out: &mut String, goal: &GoalReport) -> std::fmt::Result {
     let all = goal.configurations.iter();
     let rejected = all.filter_map(|each| Some((each.label, each.rejections.first()?)));
     let reasons = rejected_in_words(rejected.clone());
     let count = rejected.count();
     if count > 0 {
-        writeln!(out, "{count} of {} cannot work:", goal.configurations.len())?;
+        writeln!(out, "{count} of {} infeasible:", goal.configurations.len())?;
     }
     for reason in reasons {
         writeln!(out, "  {reason}")?;
@@ -391,7 +379,7 @@ fn write_goals(
     writeln!(out, "{}", works_where(report, goals))?;
     writeln!(
         out,
-        "numbers are scores of 100; each goal by itself: --wide"
+        "numbers are scores of 100; --wide prints each goal separately"
     )?;
     for goal in goals {
         if let Some(found) = &goal.recommended {
@@ -420,7 +408,7 @@ fn write_goals(
 /// Families of the metrics that a goal's row shows of its recommended configuration.
 const OF_THE_RECOMMENDED: [&str; 3] = ["tip_rms", "clearance", "motion_time"];
 
-/// A row for each goal: how many configurations work, and figures of the recommended one.
+/// A row for each goal: number of feasible configurations, and figures of the recommended one.
 fn goals_table(goals: &[GoalReport], engines: &[EngineHeading]) -> Table {
     let chosen: Vec<Option<&ConfigurationReport>> = goals.iter().map(recommended).collect();
     let mut columns: Vec<Column> = shown_metrics(engines, |heading| heading.table)
@@ -435,7 +423,7 @@ fn goals_table(goals: &[GoalReport], engines: &[EngineHeading]) -> Table {
         Some(millimetres(route.distance_m))
     });
     // Before the time that a motion takes, which is the first to go where there is no room.
-    let route = Column::new("needle\nroute (mm)", routes.collect(), 0);
+    let route = Column::new("needle\npath (mm)", routes.collect(), 0);
     columns.insert(columns.len().min(2), route);
     columns.retain(|column| column.texts.iter().any(|text| text != "-"));
     loop {
@@ -452,7 +440,7 @@ fn goals_table_of(
     chosen: &[Option<&ConfigurationReport>],
     columns: &[Column],
 ) -> Table {
-    let mut header = vec!["goal", "work", "recommended"];
+    let mut header = vec!["goal", "feasible", "recommended"];
     header.extend(columns.iter().map(|column| column.heading.as_str()));
     let mut table = plain_table(&header);
     for (at, goal) in goals.iter().enumerate() {
@@ -474,7 +462,7 @@ fn recommended(goal: &GoalReport) -> Option<&ConfigurationReport> {
     all.find(|each| each.label == found.label)
 }
 
-/// Which configuration works for which goal, and why not.
+/// Which configuration is feasible for which goal, and why not.
 fn works_where(report: &Report, goals: &[GoalReport]) -> Table {
     let names: Vec<String> = goals
         .iter()
@@ -495,7 +483,7 @@ fn works_where(report: &Report, goals: &[GoalReport]) -> Table {
     table
 }
 
-/// Score, or what stands against a configuration.
+/// Score of a configuration, or why it is rejected or fails.
 fn outcome(report: &Report, goal: &GoalReport, each: &ConfigurationReport) -> Cell {
     if let Some(first) = each.rejections.first() {
         let rule = layout::in_lines(rule_in_words(first.rule), GOAL_WIDTH);

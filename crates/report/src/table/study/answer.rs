@@ -1,8 +1,9 @@
-//! The answer of a study: one sentence with its figure and interval.
+//! The answer of a study: one sentence with its value and confidence interval.
 
 use std::fmt::Write as _;
 
 use needlebench_cell::reason_in_words;
+use needlebench_show::number::{in_percent, measured, three_digits};
 use needlebench_study::statistics::{
     BinMean, ChoiceRanking, ChosenChoice, Interval, Rate, Summary,
 };
@@ -10,36 +11,35 @@ use needlebench_study::{Factor, FactorKind, Measure, Role};
 use serde::Serialize;
 
 use super::ROUNDING_MM;
-use crate::number::{in_percent, measured, three_digits};
 
-/// Levels of a factor that are asked about, at most: more are a range and no question.
+/// Most levels of a factor that are compared: more are a range, not a question.
 const MOST_LEVELS: usize = 16;
-/// Levels that the sentence names; the table has all.
+/// Levels named in the sentence; the table has all.
 const NAMED_LEVELS: usize = 3;
-/// Choices as good as the first that are named; more are counted.
+/// Candidates tied with the first that are named; more are counted.
 const NAMED_EQUALS: usize = 2;
 
 /// What a study answers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Answer {
-    /// One sentence, with its figure and interval.
+    /// One sentence, with its value and confidence interval.
     pub sentence: String,
-    /// What has to be known beside it, a sentence each.
+    /// Remarks, a sentence each.
     pub remarks: Vec<String>,
-    /// Named levels of circumstances held against each other, the factor that explains most first.
+    /// Comparisons of named levels of noise factors, the factor that explains most first.
     pub compared: Vec<Comparison>,
 }
 
-/// The levels of a factor, held against each other.
+/// A comparison of the levels of a factor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Comparison {
     /// Name of the factor.
     pub factor: String,
-    /// What they are compared by, in words.
+    /// The compared quantity, in words.
     pub response: String,
     /// Unit of the values: `1` of shares, or `mm`.
     pub unit: String,
-    /// Whether the levels differ by more than chance makes in 19 of 20 cases.
+    /// Whether the levels differ significantly at the 5 % level.
     pub differs: bool,
     /// In the order of the study.
     pub levels: Vec<LevelValue>,
@@ -55,32 +55,43 @@ pub(crate) struct LevelValue {
     pub label: String,
     /// Layouts.
     pub layouts: u64,
-    /// Mean over them; none of no layouts.
+    /// Mean over them; none without layouts.
     pub value: Option<f64>,
-    /// Its 95 % interval.
+    /// Its 95 % confidence interval.
     pub interval: Option<Interval>,
     /// Whether there are fewer than 30 independent layouts.
     pub small: bool,
 }
 
 impl Comparison {
-    /// A value with its interval.
+    /// A value with its interval, for a table.
     pub fn text(&self, level: &LevelValue) -> String {
+        self.value_text(level, "", "..")
+    }
+
+    /// A value with its interval: `ci` before it, `to` between its ends.
+    fn value_text(&self, level: &LevelValue, ci: &str, to: &str) -> String {
         let Some(value) = level.value else {
             return "no layouts".to_owned();
         };
         let interval = level.interval;
         if self.unit == "1" {
-            let to = |each: Interval| format!(" ({})", percents(each));
+            let ends = |each: Interval| {
+                format!(
+                    " ({ci}{} {to} {} %)",
+                    in_percent(each.low),
+                    in_percent(each.high)
+                )
+            };
             return format!(
                 "{} %{}",
                 in_percent(value),
-                interval.map_or(String::new(), to)
+                interval.map_or(String::new(), ends)
             );
         }
-        let to = |each: Interval| {
+        let ends = |each: Interval| {
             format!(
-                " ({} to {})",
+                " ({ci}{} {to} {})",
                 three_digits(each.low),
                 three_digits(each.high)
             )
@@ -88,12 +99,12 @@ impl Comparison {
         format!(
             "{}{}",
             measured(value, &self.unit),
-            interval.map_or(String::new(), to)
+            interval.map_or(String::new(), ends)
         )
     }
 
     fn named(&self, level: &LevelValue) -> String {
-        let text = self.text(level);
+        let text = self.value_text(level, "95 % CI ", "to");
         match level.label.as_str() {
             "true" => format!("{text} with it"),
             "false" => format!("{text} without"),
@@ -150,7 +161,7 @@ pub(crate) fn percents(interval: Interval) -> String {
 }
 
 impl Answer {
-    /// Of the statistics of a study; `working` configurations have to be ok for a layout to work.
+    /// From the statistics of a study; a layout is feasible with at least `working` feasible configurations.
     pub fn new(summary: &Summary, factors: &[Factor], working: usize) -> Self {
         let compared = if summary.choices.is_some() {
             Vec::new()
@@ -160,7 +171,7 @@ impl Answer {
         let mut remarks = Vec::new();
         let mut sentence = if summary.overall.layouts == 0 {
             format!(
-                "no answer: none of the {} layouts can exist",
+                "no answer: all {} layouts are invalid",
                 summary.overall.cases
             )
         } else if let Some(why) = nothing_judged(summary, working) {
@@ -188,26 +199,26 @@ impl Answer {
     }
 }
 
-/// Why there is no answer where no layout could be judged.
+/// Why there is no answer where no layout could be evaluated.
 fn nothing_judged(summary: &Summary, working: usize) -> Option<String> {
     let undecided = undecided(summary, working);
     let mut configurations = summary.overall.configurations.iter();
     let judged = configurations.any(|each| each.ok > 0 || each.failed > 0);
     (undecided > 0 && !judged).then(|| {
         format!(
-            "no answer: none of the {undecided} layouts in which something may work could be judged ({})",
+            "no answer: none of the {undecided} possibly feasible layouts could be evaluated ({})",
             open_reasons(summary)
         )
     })
 }
 
-/// Layouts of which it is not known whether they work.
+/// Layouts whose feasibility is not known.
 fn undecided(summary: &Summary, working: usize) -> u64 {
     let undecided = &summary.overall.undecided;
     undecided.get(working - 1).copied().unwrap_or_default()
 }
 
-/// What was not judged, the most frequent first: `engine failure rapier`.
+/// Why motions were not evaluated, the most frequent reason first: `engine failure rapier`.
 fn open_reasons(summary: &Summary) -> String {
     let mut counts: Vec<(&str, u64)> = summary.overall.not_judged().into_iter().collect();
     counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
@@ -219,38 +230,39 @@ fn open_reasons(summary: &Summary) -> String {
     texts.join(", ")
 }
 
-/// What a share of layouts leaves out where some were not judged.
+/// The upper limit of the share of feasible layouts where some were not evaluated.
 fn not_judged_in_words(summary: &Summary, working: usize) -> Option<String> {
     let undecided = undecided(summary, working);
     let layouts = summary.overall.layouts;
     (undecided > 0).then(|| {
         let most = summary.overall.at_least[working - 1].successes + undecided;
         format!(
-            "{undecided} of {layouts} layouts were not judged ({}) and count as not working: were they all to work, \
-             it would be {} %",
+            "{undecided} of {layouts} layouts were not evaluated ({}) and count as infeasible; if all were feasible, \
+             the rate would be {} %",
             open_reasons(summary),
             in_percent(most as f64 / layouts as f64)
         )
     })
 }
 
-/// `at least one configuration works`.
+/// `at least one configuration is feasible`.
 fn works_in_words(working: usize) -> String {
     match working {
-        1 => "at least one configuration works".to_owned(),
-        count => format!("at least {count} configurations work"),
+        1 => "at least one configuration is feasible".to_owned(),
+        count => format!("at least {count} configurations are feasible"),
     }
 }
 
-/// How many layouts work whose needle keeps away too, where that is left out of what works.
+/// How many layouts are feasible including the needle path, where feasibility does not include it.
 fn with_route_in_words(summary: &Summary, working: usize) -> Option<String> {
     let route = summary.overall.with_route.as_ref()?;
     let rate = &route.at_least[working - 1];
-    let interval = rate
-        .interval
-        .map_or(String::new(), |each| format!(" ({})", percents(each)));
+    let interval = rate.interval.map_or(String::new(), |each| {
+        format!(" (95 % CI {})", percents(each))
+    });
     Some(format!(
-        "in {} %{interval} the needle keeps {} mm from bone, vessel and organ too, and {} of {} pass nearer",
+        "in {} %{interval} the needle path also keeps {} mm from bone, vessels and organs; {} of {} needle paths \
+         pass closer",
         rate.rate.map_or("-".to_owned(), in_percent),
         three_digits(route.least_mm),
         route.known - route.kept,
@@ -258,15 +270,15 @@ fn with_route_in_words(summary: &Summary, working: usize) -> Option<String> {
     ))
 }
 
-/// `in 98.2 % of 512 layouts (95 % interval 95.0 to 99.6 %`, without the last bracket.
-fn share_of_layouts(rate: &Rate) -> String {
+/// `in 98.2 % of 512 layouts (95 % CI 95.0 to 99.6 %)`.
+fn share_of_layouts(rate: &Rate, ci: &str) -> String {
     let share = rate
         .rate
         .map_or("no".to_owned(), |share| format!("{} %", in_percent(share)));
-    let interval = rate.interval.map_or("no interval".to_owned(), |each| {
-        format!("95 % interval {}", percents(each))
+    let interval = rate.interval.map_or("no CI".to_owned(), |each| {
+        format!("{ci} {}", percents(each))
     });
-    format!("in {share} of {} layouts ({interval}", rate.of)
+    format!("in {share} of {} layouts ({interval})", rate.of)
 }
 
 fn of_choice(
@@ -275,28 +287,29 @@ fn of_choice(
     best: &ChosenChoice,
     working: usize,
 ) -> String {
-    let names: Vec<String> = ranking.axes.iter().map(|axis| spaced(&axis.name)).collect();
     let rate = &summary.overall.at_least[working - 1];
     if rate.successes == 0 {
+        let names: Vec<String> = ranking.axes.iter().map(|axis| spaced(&axis.name)).collect();
+        let required = match working {
+            1 => "at least one feasible configuration".to_owned(),
+            count => format!("at least {count} feasible configurations"),
+        };
         return format!(
-            "none of the {} choices of {} works: in none of the layouts {}",
+            "none of the {} candidates ({}) is feasible in any layout; required: {required}",
             best.of,
-            names.join(", "),
-            works_in_words(working)
+            names.join(", ")
         );
     }
     format!(
-        "best {} of {}: {}; with it {} {}, which holds for all {} at once)",
-        names.join(", "),
+        "best of {} candidates: {}; {} {}",
         best.of,
         best.label,
         works_in_words(working),
-        share_of_layouts(rate),
-        best.of
+        share_of_layouts(rate, "simultaneous 95 % CI")
     )
 }
 
-/// What cannot be told apart from the first choice, the first that can, and what picking it is worth.
+/// Candidates not significantly different from the first, the first that is, and the split-half rate.
 fn beside_the_first(ranking: &ChoiceRanking, best: &ChosenChoice) -> Vec<String> {
     let mut remarks = Vec::new();
     let others = || {
@@ -312,27 +325,32 @@ fn beside_the_first(ranking: &ChoiceRanking, best: &ChosenChoice) -> Vec<String>
     match equals.len() {
         0 => {}
         count if count <= NAMED_EQUALS => {
-            remarks.push(format!("not told apart from it: {}", equals.join("; ")));
+            remarks.push(format!(
+                "not significantly different: {}",
+                equals.join("; ")
+            ));
         }
-        count => remarks.push(format!("{count} others cannot be told apart from it")),
+        count => remarks.push(format!(
+            "{count} other candidates are not significantly different"
+        )),
     }
     if let Some((next, found)) = others().find(|(_, found)| found.distinguishable) {
         let interval = found.interval.map_or(String::new(), |each| {
             format!(
-                " (95 % interval {} to {})",
+                " (95 % CI {} to {})",
                 in_percent(each.low),
                 in_percent(each.high)
             )
         });
         remarks.push(format!(
-            "the next, {}, works in {} points fewer{interval}",
+            "next: {}, {} percentage points lower{interval}",
             next.label,
             in_percent(found.difference)
         ));
     }
     if let Some(share) = best.held_out {
         remarks.push(format!(
-            "chosen on one half of the sampled points and judged on the other half, the best choice works in {} %",
+            "split-half validation (selected on one half, evaluated on the other): {} %",
             in_percent(share)
         ));
     }
@@ -346,14 +364,17 @@ fn of_circumstances(
     remarks: &mut Vec<String>,
 ) -> String {
     let rate = &summary.overall.at_least[working - 1];
-    let mut works = format!("{} {})", works_in_words(working), share_of_layouts(rate));
+    let mut works = format!(
+        "{} {}",
+        works_in_words(working),
+        share_of_layouts(rate, "95 % CI")
+    );
     let configurations = summary.overall.configurations.iter();
     let most = configurations.reduce(|a, b| if b.ok > a.ok { b } else { a });
     if let Some(most) = most.filter(|each| each.ok > 0) {
-        let interval = most
-            .success
-            .interval
-            .map_or(String::new(), |each| format!(" ({})", percents(each)));
+        let interval = most.success.interval.map_or(String::new(), |each| {
+            format!(" (95 % CI {})", percents(each))
+        });
         let _ = write!(
             works,
             "; most often {}, in {} %{interval}",
@@ -377,7 +398,7 @@ fn small(rate: &Rate) -> Option<String> {
     rate.remark.clone().filter(|_| rate.of > 0)
 }
 
-/// Whether a factor's levels are what a study asks about: named ones, each crossed with all the others.
+/// Whether a study compares a factor's levels: named ones, each crossed with all the others.
 fn is_question(factor: &Factor) -> bool {
     match &factor.kind {
         FactorKind::Levels(levels) => {
@@ -390,7 +411,7 @@ fn is_question(factor: &Factor) -> bool {
     }
 }
 
-/// By the rate of layouts that work, or where that tells nothing by the tip error, then the clearance.
+/// By the rate of feasible layouts, or where that does not differ by the tip error, then the clearance.
 fn comparisons(summary: &Summary, factors: &[Factor]) -> Vec<Comparison> {
     let axes = summary.effects.axes.iter().enumerate();
     // The first factor is the goal.
@@ -404,8 +425,8 @@ fn comparisons(summary: &Summary, factors: &[Factor]) -> Vec<Comparison> {
 }
 
 const RESPONSES: [(&str, &str, &str); 3] = [
-    ("any_works", "layouts that work", "1"),
-    // Of each layout the least of those that work, whichever that turned out to be.
+    ("any_works", "feasible layouts", "1"),
+    // Of each layout the least of the feasible configurations, whichever that turned out to be.
     (
         "least_tip_error_mm",
         "mean tip error of the most accurate configuration",

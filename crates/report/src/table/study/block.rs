@@ -1,8 +1,7 @@
 //! Numbers in the tables of a study's statistics.
 
+use needlebench_show::number::{in_percent, three_digits};
 use needlebench_study::statistics::{Interval, Rate};
-
-use crate::number::{in_percent, three_digits};
 
 /// Reasons that are shown of each configuration.
 pub(super) const MOST_REASONS: usize = 3;

@@ -7,15 +7,13 @@ use needlebench_bench::study::{StudyCase, StudyColumns};
 use needlebench_cell::reason_in_words;
 use needlebench_evaluation::metric::Show;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_show::number::three_digits;
+use needlebench_show::{Block, blocks_text};
 use needlebench_study::{CaseResult, Design, FactorKind, FactorValue, Row};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::number::three_digits;
-use crate::table::Block;
-use crate::table::blocks_text;
-
-/// A case as a JSON value: its factors, and its rows with every metric that they have.
+/// A case as a JSON value: its factors, and its rows with all their metrics.
 #[derive(Debug, Serialize)]
 pub struct CaseReport {
     case: u64,
@@ -148,7 +146,7 @@ pub fn case_text(
     let header = ["configuration", "<outcome"]
         .into_iter()
         .chain(columns.iter().map(|column| column.heading))
-        .chain(["<why not"])
+        .chain(["<reason"])
         .map(str::to_owned)
         .collect();
     let rows = result.rows.iter().map(|row| {

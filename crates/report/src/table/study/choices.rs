@@ -1,13 +1,13 @@
-//! What a study compares: choices, best first, or the levels of what it asks about.
+//! What a study compares: candidates, best first, or the levels of a factor.
 
+use needlebench_show::Block;
+use needlebench_show::number::in_percent;
 use needlebench_study::statistics::{Choice, QuantileValue, Summary};
 
 use super::answer::{Answer, Comparison, has_tip_errors, percents, spaced};
 use super::block::{case_list, or_dash, rate_text};
-use crate::number::in_percent;
-use crate::table::Block;
 
-/// Choices on the first screen, and in the whole table.
+/// Candidates on the first screen, and in the whole table.
 const MOST_FIRST: usize = 5;
 const MOST_IN_ALL: usize = 30;
 
@@ -40,27 +40,26 @@ pub(super) fn compared_first(summary: &Summary, answer: &Answer, blocks: &mut Ve
         .take(MOST_FIRST)
         .map(row)
         .collect();
-    let mut header = vec!["<choice", "works (%)\nof layouts", "clearance\n5 % (mm)"];
+    let mut header = vec!["<candidate", "success\nrate (%)", "P5\nclearance\n(mm)"];
     if with_error {
-        header.push("tip error\n50 % (mm)");
+        header.push("median tip\nerror (mm)");
     }
-    header.push("against\n1. (%)");
+    header.push("difference to\nno. 1 (pp)");
     blocks.push(Block::Table {
         header: header.into_iter().map(str::to_owned).collect(),
         rows,
     });
     let left = ranking.choices.len().saturating_sub(MOST_FIRST);
     let mut lines = vec![
-        "in brackets: 95 % intervals, of a choice by itself; =: not told apart from the first"
-            .to_owned(),
+        "in brackets: individual 95 % CI; =: not significantly different from no. 1".to_owned(),
     ];
     if left > 0 {
-        lines.push(format!("{left} more choices: --wide"));
+        lines.push(format!("{left} more candidates: --wide"));
     }
     blocks.push(Block::Lines(lines));
 }
 
-/// `-1.2`, or `=` of what cannot be told apart from the first.
+/// `-1.2`, or `=` where it does not differ significantly from the first.
 fn points_behind(choice: &Choice) -> String {
     choice
         .against_first
@@ -74,14 +73,14 @@ fn points_behind(choice: &Choice) -> String {
         })
 }
 
-/// `-1.2 (-2.1 to -0.3)`.
+/// `-1.2 (-2.1 .. -0.3)`.
 fn against_first(choice: &Choice) -> String {
     match &choice.against_first {
         None => String::new(),
         Some(found) if !found.distinguishable => "=".to_owned(),
         Some(found) => {
             let interval = found.interval.map_or(String::new(), |each| {
-                format!(" ({} to {})", signed(-each.high), signed(-each.low))
+                format!(" ({} .. {})", signed(-each.high), signed(-each.low))
             });
             format!("{}{interval}", signed(-found.difference))
         }
@@ -118,7 +117,7 @@ fn levels(compared: &Comparison, blocks: &mut Vec<Block>) {
     let header = [
         spaced(&compared.factor),
         "layouts".to_owned(),
-        format!("{} (95 %)", compared.response),
+        format!("{} (95 % CI)", compared.response),
         "<".to_owned(),
     ];
     let any_small = compared.levels.iter().any(|level| level.small);
@@ -130,12 +129,12 @@ fn levels(compared: &Comparison, blocks: &mut Vec<Block>) {
     });
     if !compared.differs {
         blocks.push(Block::Lines(vec![
-            "chance alone makes such differences in 1 of 20 studies".to_owned(),
+            "not significant at the 5 % level".to_owned(),
         ]));
     }
 }
 
-/// All choices with everything that is known of them.
+/// All candidates with all their statistics.
 pub(super) fn all_choices(summary: &Summary, blocks: &mut Vec<Block>) {
     let Some(ranking) = &summary.choices else {
         return;
@@ -156,17 +155,17 @@ pub(super) fn all_choices(summary: &Summary, blocks: &mut Vec<Block>) {
         .take(MOST_IN_ALL)
         .map(row)
         .collect();
-    blocks.push(Block::Heading("all choices".to_owned()));
-    let more = format!("{} or more\nwork (%)", ranking.working_configurations);
+    blocks.push(Block::Heading("all candidates".to_owned()));
+    let more = format!("{} or more\nfeasible (%)", ranking.working_configurations);
     blocks.push(Block::Table {
         header: [
-            "choice",
-            "works, 95 %",
+            "candidate",
+            "success rate,\n95 % CI",
             more.as_str(),
             "cases",
-            "cannot\nexist",
-            "against 1.\n(points)",
-            "<first cases in which none works",
+            "invalid\nlayouts",
+            "difference to\nno. 1 (pp)",
+            "<first infeasible cases",
         ]
         .map(str::to_owned)
         .to_vec(),
@@ -179,7 +178,7 @@ pub(super) fn all_choices(summary: &Summary, blocks: &mut Vec<Block>) {
     });
     if left.len() > 0 {
         let lines = format!(
-            "{} more choices, of which {} cannot be told apart from the first",
+            "{} more candidates, {} of them not significantly different from no. 1",
             left.len(),
             good.count()
         );

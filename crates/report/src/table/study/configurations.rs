@@ -1,15 +1,15 @@
-//! How often each configuration works, how near it comes to anything, and what is in its way.
+//! Success rate of each configuration, its clearances and tip errors, and why it is infeasible.
 
 use needlebench_cell::reason_in_words;
+use needlebench_show::Block;
+use needlebench_show::number::{in_percent, three_digits};
 use needlebench_study::statistics::{BEST, ConfigurationCounts, Rate, Summary};
 use needlebench_study::{Measure, MetricColumn};
 
 use super::answer::{Answer, has_tip_errors, spaced};
 use super::block::{MOST_REASONS, or_dash, rate_text};
-use crate::number::{in_percent, three_digits};
-use crate::table::Block;
 
-/// Share of the layouts below which a reason is not worth a word on the first screen.
+/// Share of the layouts below which a reason is left out on the first screen.
 const WORTH_A_WORD: f64 = 0.01;
 
 fn quantile(summary: &Summary, of: &str, metric: &str, p: f64) -> String {
@@ -26,26 +26,26 @@ fn most_measured(summary: &Summary, measure: Measure) -> Option<&MetricColumn> {
     summary.measured(measure).max_by_key(count)
 }
 
-/// The eight with their rates, and what is mostly in their way.
+/// The eight configurations with their success rates and main failures.
 pub(super) fn configurations_first(summary: &Summary, answer: &Answer, blocks: &mut Vec<Block>) {
     let layouts = summary.overall.layouts as f64;
     let clearance = most_measured(summary, Measure::Clearance);
     let error = most_measured(summary, Measure::TipError).filter(|_| has_tip_errors(summary));
-    let mut header = vec!["configuration", "works (%)\nof layouts"];
+    let mut header = vec!["configuration", "success\nrate (%)"];
     let route = summary.overall.with_route.as_ref();
     if route.is_some() {
-        header.push("with\nroute (%)");
+        header.push("with needle\npath (%)");
     }
     if clearance.is_some() {
-        header.push("clearance\n5 % (mm)");
+        header.push("P5\nclearance\n(mm)");
     }
     if error.is_some() {
-        header.push("tip error\n95 % (mm)");
+        header.push("tip error,\nP95 of\nlayouts (mm)");
     }
-    // What is in the way, where errors and routes leave room for it.
+    // The main failure, where errors and needle paths leave space for it.
     let with_reason = error.is_none() && route.is_none();
     if with_reason {
-        header.push("<mostly not, as");
+        header.push("<main failure");
     }
     let numbers = |of: &str| {
         let shown = [(clearance, 0.05), (error, 0.95)];
@@ -79,7 +79,7 @@ pub(super) fn configurations_first(summary: &Summary, answer: &Answer, blocks: &
         })
         .collect();
     let mut best = vec![
-        "best of each".to_owned(),
+        "best per layout".to_owned(),
         known_rate(
             &summary.overall.at_least[0],
             summary
@@ -104,10 +104,7 @@ pub(super) fn configurations_first(summary: &Summary, answer: &Answer, blocks: &
         Some(best) => format!("configurations, with {}", best.label),
         // Pooled figures answer no question of a factor that makes a difference.
         None if !together.is_empty() => {
-            format!(
-                "configurations, over every {} together",
-                together.join(" and ")
-            )
+            format!("configurations, pooled over {}", together.join(" and "))
         }
         None => "configurations".to_owned(),
     }));
@@ -116,26 +113,26 @@ pub(super) fn configurations_first(summary: &Summary, answer: &Answer, blocks: &
         rows,
     });
     let mut below = vec![
-        "clearance: 5 % of the layouts have less; best: of those that work, with the largest clearance"
+        "clearance: 5th percentile; best: the feasible configuration with the largest clearance"
             .to_owned(),
     ];
     below.extend(route.map(|route| {
         format!(
-            "with route: works, and the needle keeps {} mm from bone, vessel and organ",
+            "with needle path: feasible, and the needle path keeps {} mm from bone, vessels and organs",
             three_digits(route.least_mm)
         )
     }));
     blocks.push(Block::Lines(below));
 }
 
-/// A rate with its interval, or where some were not judged between what it is.
+/// A rate with its interval, or where some were not evaluated its least and largest possible value.
 fn known_rate(rate: &Rate, not_judged: u64) -> String {
     if not_judged == 0 || rate.of == 0 {
         return rate_text(rate);
     }
     let [low, high] = [rate.successes, rate.successes + not_judged]
         .map(|count| in_percent(count as f64 / rate.of as f64));
-    format!("{low} to {high}, not judged")
+    format!("{low} to {high}, not evaluated")
 }
 
 fn share(rate: &Rate) -> String {
@@ -148,7 +145,7 @@ fn reason(detail: &str, count: u64, layouts: f64) -> String {
     format!("{} {share:.digits$} %", reason_in_words(detail))
 }
 
-/// Clearances and errors with their quantiles, and all that is in the way.
+/// Percentiles of clearances and tip errors, and all reasons for infeasibility.
 pub(super) fn all_configurations(summary: &Summary, blocks: &mut Vec<Block>) {
     let several = |measure| summary.measured(measure).count() > 1;
     let clearances = summary.measured(Measure::Clearance);
@@ -172,8 +169,8 @@ pub(super) fn all_configurations(summary: &Summary, blocks: &mut Vec<Block>) {
     }
     let mut header = vec!["configuration".to_owned()];
     for (column, [first, second], words) in &columns {
-        header.push(format!("{words}\n({}) {} %", column.unit, 100.0 * first));
-        header.push(format!("\n{} %", 100.0 * second));
+        header.push(format!("{words}\n({}), P{}", column.unit, 100.0 * first));
+        header.push(format!("\nP{}", 100.0 * second));
     }
     header.push("best\n(%)".to_owned());
     let layouts = summary.overall.layouts as f64;
@@ -189,14 +186,14 @@ pub(super) fn all_configurations(summary: &Summary, blocks: &mut Vec<Block>) {
             .collect()
     });
     blocks.push(Block::Heading(
-        "clearance and tip error, quantiles".to_owned(),
+        "clearance and tip error, percentiles".to_owned(),
     ));
     blocks.push(Block::Table {
         header,
         rows: rows.collect(),
     });
     blocks.push(Block::Lines(vec![
-        "of a configuration: over the layouts in which it is not rejected; of the best: over the layouts that work"
+        "configurations: over the layouts in which they are not rejected; best: over the feasible layouts"
             .to_owned(),
     ]));
     reasons(summary, blocks);
@@ -219,8 +216,8 @@ fn reasons(summary: &Summary, blocks: &mut Vec<Block>) {
     let rows: Vec<Vec<String>> = with_reasons.map(row).collect();
     if !rows.is_empty() {
         blocks.push(Block::Heading(
-            "why a configuration does not work, % of layouts".to_owned(),
+            "reasons for rejection or failure, % of layouts".to_owned(),
         ));
-        blocks.push(Block::table(["configuration", "<because of"], rows));
+        blocks.push(Block::table(["configuration", "<reasons"], rows));
     }
 }

@@ -1,20 +1,20 @@
-//! The criteria of a study: values, limits, verdicts, and the requirements that they stand for.
+//! The criteria of a study: values, limits, verdicts, and the requirements that they verify.
 
-use needlebench_cell::requirements::Requirements;
 use needlebench_evaluation::report::TraceOutcome;
+use needlebench_scenario::requirements::Requirements;
+use needlebench_show::Block;
+use needlebench_show::number::{in_percent, measured};
 use needlebench_study::statistics::{BEST, CriterionResult};
 
 use super::answer::spaced;
 use super::block::case_list;
-use crate::number::{in_percent, measured};
-use crate::table::Block;
 
 /// Whether the limit of a criterion is the least that is allowed; the other limits are the most.
 fn is_lower_limit(criterion: &str) -> bool {
     criterion.starts_with("min_")
 }
 
-/// What a criterion asks of what, in words: `layouts working`, `clearance of the best`.
+/// The quantity of a criterion and its subject, in words: `layouts working`, `clearance of the best`.
 fn in_words(result: &CriterionResult) -> String {
     let key = &result.criterion;
     let name = key
@@ -39,12 +39,12 @@ fn text(result: &CriterionResult, value: f64) -> String {
 fn verdict(result: &CriterionResult) -> &'static str {
     match (result.pass, result.is_judged()) {
         (true, _) => "met",
-        (false, true) => "MISSED",
-        (false, false) => "not judged",
+        (false, true) => "FAIL",
+        (false, false) => "not evaluated",
     }
 }
 
-/// Whether a criterion is met by its estimate, and the unfavourable end of the interval would miss it.
+/// Whether a criterion is met by its estimate, but not by the unfavourable end of the interval.
 fn is_met_by_estimate(result: &CriterionResult) -> bool {
     result.pass
         && result.interval.is_some_and(|interval| {
@@ -56,7 +56,7 @@ fn is_met_by_estimate(result: &CriterionResult) -> bool {
         })
 }
 
-/// A row for each criterion; those that are missed first.
+/// A row for each criterion; failed ones first.
 pub(super) fn criteria_first(criteria: &[CriterionResult], blocks: &mut Vec<Block>) {
     if criteria.is_empty() {
         return;
@@ -66,7 +66,7 @@ pub(super) fn criteria_first(criteria: &[CriterionResult], blocks: &mut Vec<Bloc
     let row = |each: &&CriterionResult| {
         let interval = each.interval.map_or(String::new(), |interval| {
             format!(
-                " ({} to {})",
+                " ({} .. {})",
                 text(each, interval.low),
                 text(each, interval.high)
             )
@@ -93,7 +93,7 @@ pub(super) fn criteria_first(criteria: &[CriterionResult], blocks: &mut Vec<Bloc
         .iter()
         .map(|each| row(each)[..columns].to_vec())
         .collect();
-    let header = ["criterion", "<", "value (95 %)", "limit", "<requirement"];
+    let header = ["criterion", "<", "value (95 % CI)", "limit", "<requirement"];
     blocks.push(Block::Heading("criteria".to_owned()));
     blocks.push(Block::Table {
         header: header[..columns]
@@ -104,7 +104,7 @@ pub(super) fn criteria_first(criteria: &[CriterionResult], blocks: &mut Vec<Bloc
     });
     let mut remarks = Vec::new();
     if criteria.iter().any(|each| each.confidence) {
-        remarks.push("judged by the unfavourable end of the interval".to_owned());
+        remarks.push("tested: the unfavourable end of the 95 % CI".to_owned());
     }
     let by_estimate = criteria
         .iter()
@@ -112,8 +112,13 @@ pub(super) fn criteria_first(criteria: &[CriterionResult], blocks: &mut Vec<Bloc
         .count();
     if by_estimate > 0 {
         remarks.push(format!(
-            "of {by_estimate} that are met the interval reaches beyond the limit: so few cases do not show it; \
-             `confidence = true` judges by the interval"
+            "{by_estimate} passed {} a CI that includes the limit (sample too small); `confidence = true` tests the \
+             CI bound",
+            if by_estimate == 1 {
+                "criterion has"
+            } else {
+                "criteria have"
+            }
         ));
     }
     if !remarks.is_empty() {
@@ -121,7 +126,7 @@ pub(super) fn criteria_first(criteria: &[CriterionResult], blocks: &mut Vec<Bloc
     }
 }
 
-/// What was judged, word for word, with cases to look at.
+/// The criteria in full, with their worst cases.
 pub(super) fn criteria_in_full(criteria: &[CriterionResult], blocks: &mut Vec<Block>) {
     if criteria.is_empty() {
         return;
@@ -139,11 +144,11 @@ pub(super) fn criteria_in_full(criteria: &[CriterionResult], blocks: &mut Vec<Bl
             each.detail
         )
     };
-    blocks.push(Block::Heading("criteria, word for word".to_owned()));
+    blocks.push(Block::Heading("criteria in full".to_owned()));
     blocks.push(Block::Lines(criteria.iter().map(line).collect()));
 }
 
-/// The trace matrix: requirements, the criteria that stand for them, and what came of these.
+/// The trace matrix: requirements, the criteria that verify them, and their outcomes.
 pub(crate) fn requirements_blocks(
     requirements: &Requirements,
     criteria: &[CriterionResult],
@@ -177,8 +182,8 @@ pub(crate) fn requirements_blocks(
                 "<criterion",
                 "<outcome",
                 "met",
-                "missed",
-                "not judged",
+                "failed",
+                "not evaluated",
             ],
             rows,
         ),

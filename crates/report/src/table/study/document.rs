@@ -1,5 +1,7 @@
 //! A study's statistics as headings, tables and lines, for terminals and for Markdown.
 
+use needlebench_show::Block;
+use needlebench_show::number::{in_percent, rounded, three_digits};
 use needlebench_study::statistics::{BEST, BinMean, CriterionResult, RegionMap, Summary};
 
 use super::ROUNDING_MM;
@@ -8,22 +10,20 @@ use super::block::{MOST_REASONS, case_list, rate_text};
 use super::choices::{all_choices, compared_first};
 use super::configurations::{all_configurations, configurations_first};
 use super::criteria::{criteria_first, criteria_in_full};
-use crate::number::{in_percent, rounded, three_digits};
-use crate::table::Block;
 
 /// Interactions that are shown of each response.
 const MOST_INTERACTIONS: usize = 3;
 
-/// A study's statistics: what answers it, on one screen, and all else.
+/// A study's statistics: the answer on one screen, and everything else.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Document {
-    /// Verdict, answer and the tables that it rests on.
+    /// Verdict, answer and the tables behind it.
     pub first: Vec<Block>,
-    /// All other tables, and how the numbers were found.
+    /// All other tables and notes.
     pub more: Vec<Block>,
 }
 
-/// What a document is made of besides the statistics.
+/// The parts of a document.
 pub struct Parts<'a> {
     /// The statistics.
     pub summary: &'a Summary,
@@ -33,13 +33,13 @@ pub struct Parts<'a> {
     pub criteria: &'a [CriterionResult],
     /// The verdict with its counts.
     pub verdict: &'a str,
-    /// What a study of postures has to say of itself.
+    /// The caveats of the study: postures only, needle path not checked.
     pub headline: Option<&'a str>,
 }
 
 impl Document {
-    /// The first screen is the verdict, the answer with what has to be known beside it, the choices or
-    /// levels that it compares, the configurations, and the criteria.
+    /// The first screen has the verdict, the answer with its remarks, the candidates or levels that it compares,
+    /// the configurations, and the criteria.
     pub fn new(parts: &Parts<'_>) -> Self {
         let summary = parts.summary;
         let mut first = vec![
@@ -48,10 +48,10 @@ impl Document {
         ];
         let beside: Vec<String> = parts
             .headline
-            .map(capital)
+            .map(str::to_owned)
             .into_iter()
             .chain(parts.answer.remarks.iter().cloned())
-            .chain(that_cannot_exist(summary))
+            .chain(invalid_layouts_remark(summary))
             .collect();
         if !beside.is_empty() {
             first.push(Block::Lines(beside));
@@ -74,11 +74,11 @@ impl Document {
         Self { first, more }
     }
 
-    /// Adds what to keep in mind, and how the criteria read to the last digit.
+    /// Adds the notes, and the criteria in full.
     pub fn finish(mut self, parts: &Parts<'_>) -> Self {
         let notes = &parts.summary.notes;
         if !notes.is_empty() {
-            self.more.push(Block::Heading("to keep in mind".to_owned()));
+            self.more.push(Block::Heading("notes".to_owned()));
             self.more.push(Block::Lines(notes.clone()));
         }
         criteria_in_full(parts.criteria, &mut self.more);
@@ -86,28 +86,19 @@ impl Document {
     }
 }
 
-/// How many cases no rate is of, and mostly why.
-fn that_cannot_exist(summary: &Summary) -> Option<String> {
+/// How many cases are excluded from all rates, and the main reason.
+fn invalid_layouts_remark(summary: &Summary) -> Option<String> {
     let overall = &summary.overall;
     let mostly = overall.invalid_details.first();
     let mostly = mostly.map_or(String::new(), |detail| {
-        format!(", mostly because of {}", detail.detail)
+        format!(" (main reason: {})", detail.detail)
     });
     (overall.invalid > 0).then(|| {
         format!(
-            "{} of {} cases are layouts that cannot exist and in no rate{mostly}",
+            "{} of {} cases are invalid layouts, excluded from all rates{mostly}",
             overall.invalid, overall.cases
         )
     })
-}
-
-/// `postures only: ...` with its warning in capitals.
-fn capital(headline: &str) -> String {
-    headline.replacen("postures", "POSTURES", 1).replacen(
-        "needle route left out",
-        "NEEDLE ROUTE left out",
-        1,
-    )
 }
 
 fn overview(summary: &Summary) -> Vec<String> {
@@ -116,26 +107,29 @@ fn overview(summary: &Summary) -> Vec<String> {
     let of_choice = summary.of_choice.as_ref();
     if let (Some(best), Some(all)) = (of_choice, &summary.over_all_choices) {
         lines.push(format!(
-            "{} cases with {} choices; rates, quantiles and criteria are of the first: {}",
+            "{} cases with {} candidates; rates, percentiles and criteria refer to no. 1: {}",
             all.cases, best.of, best.label
         ));
-        lines.push(format!("choices are ranked by {}", best.by));
+        lines.push(format!("candidates are ranked by {}", best.by));
     }
     lines.push(format!(
-        "{} cases: {} layouts that can exist, {} that cannot and are in no rate",
+        "{} cases: {} valid layouts, {} invalid layouts (excluded from all rates)",
         overall.cases, overall.layouts, overall.invalid
     ));
     for detail in overall.invalid_details.iter().take(MOST_REASONS) {
-        lines.push(format!("  {} because of {}", detail.count, detail.detail));
+        lines.push(format!(
+            "  {} invalid because of {}",
+            detail.count, detail.detail
+        ));
     }
     for (k, rate) in (1..).zip(&overall.at_least).take(3) {
         if rate.rate.is_none() {
             continue;
         }
         let configurations = if k == 1 {
-            "configuration works"
+            "configuration feasible"
         } else {
-            "configurations work"
+            "configurations feasible"
         };
         let remark = rate
             .remark
@@ -148,11 +142,11 @@ fn overview(summary: &Summary) -> Vec<String> {
     }
     lines.push(match of_choice {
         Some(best) => format!(
-            "intervals of the first choice: 95 % for all {} choices at once, {} % each; all others 95 %",
+            "intervals of no. 1: simultaneous 95 % CI for all {} candidates ({} % each); all others: individual 95 % CI",
             best.of,
             rounded(100.0 * best.confidence_each, 3)
         ),
-        None => "intervals: 95 %".to_owned(),
+        None => "intervals: 95 % CI".to_owned(),
     });
     lines
 }
@@ -181,9 +175,9 @@ fn goals(summary: &Summary, blocks: &mut Vec<Block>) {
         [
             "goal",
             "valid\nlayouts",
-            "cannot\nexist",
-            "work (%)",
-            "<most often ok (%)",
+            "invalid\nlayouts",
+            "success\nrate (%)",
+            "<most often feasible (%)",
         ],
         rows.collect(),
     ));
@@ -221,23 +215,29 @@ fn effects(summary: &Summary, blocks: &mut Vec<Block>) {
     });
     blocks.push(Block::Heading(over_all_choices(
         summary,
-        "which factor decides: share of the variance that it explains (%)",
+        "main effects: share of variance explained (%)",
     )));
     let mut header = vec![
         "factor",
-        "any\nworks",
-        "how many\nwork",
+        "any\nfeasible",
+        "number\nfeasible",
         "best\nclearance",
         "least\ntip error",
     ];
     header.truncate(1 + shown);
-    header.push("works, worst .. best\nlevel or range (%)");
+    header.push("success rate (%),\nworst .. best level");
     blocks.push(Block::Table {
         header: header.into_iter().map(str::to_owned).collect(),
         rows: rows.collect(),
     });
     let mut lines = Vec::new();
-    for response in responses {
+    let names = [
+        "any feasible",
+        "number feasible",
+        "best clearance",
+        "least tip error",
+    ];
+    for (name, response) in names.into_iter().zip(responses) {
         if response.mean.is_none_or(|mean| mean.abs() < ROUNDING_MM) {
             continue;
         }
@@ -251,11 +251,7 @@ fn effects(summary: &Summary, blocks: &mut Vec<Block>) {
             })
             .collect();
         if !clear.is_empty() {
-            lines.push(format!(
-                "together, beyond each alone, of {} (%): {}",
-                spaced(&response.response),
-                clear.join(", ")
-            ));
+            lines.push(format!("interactions, {name} (%): {}", clear.join(", ")));
         }
     }
     if !lines.is_empty() {
@@ -263,10 +259,10 @@ fn effects(summary: &Summary, blocks: &mut Vec<Block>) {
     }
 }
 
-/// A heading of what is of all choices together, as factors.
+/// A heading of a table over all candidates together, as factors.
 pub(super) fn over_all_choices(summary: &Summary, heading: &str) -> String {
     match &summary.of_choice {
-        Some(_) => format!("{heading}, over all choices"),
+        Some(_) => format!("{heading}, over all candidates"),
         None => heading.to_owned(),
     }
 }
@@ -298,14 +294,14 @@ fn regions(summary: &Summary, blocks: &mut Vec<Block>) {
     }
     blocks.push(Block::Heading(over_all_choices(
         summary,
-        "where another configuration is the best",
+        "best configuration by range",
     )));
     blocks.push(Block::table(
         [
             "factor",
             "<from .. to",
             "valid\nlayouts",
-            "work (%)",
+            "success\nrate (%)",
             "<most often best",
         ],
         rows,
@@ -346,7 +342,7 @@ fn winners_of(summary: &Summary, map: &RegionMap) -> Vec<Vec<String>> {
             } else {
                 in_percent(working as f64 / layouts as f64)
             },
-            winner.clone().unwrap_or("no winner".to_owned()),
+            winner.clone().unwrap_or("none".to_owned()),
         ]);
         at += run;
     }
@@ -358,7 +354,7 @@ fn evidence(summary: &Summary, blocks: &mut Vec<Block>) {
     let none = &summary.evidence.fewer_than[0];
     if !none.is_empty() {
         lines.push(format!(
-            "no configuration is ok in cases {}, ...",
+            "no feasible configuration in cases {}, ...",
             case_list(none)
         ));
     }
@@ -392,7 +388,7 @@ fn evidence(summary: &Summary, blocks: &mut Vec<Block>) {
         ));
     }
     if !lines.is_empty() {
-        blocks.push(Block::Heading("cases worth a look".to_owned()));
+        blocks.push(Block::Heading("cases to inspect".to_owned()));
         blocks.push(Block::Lines(lines));
     }
 }

@@ -1,11 +1,10 @@
-//! What a study of postures alone has to say of itself.
+//! The caveats of a study of postures only.
 
 use needlebench_bench::study::{PreparedStudy, Replanned};
-use needlebench_cell::study::StudyMode;
+use needlebench_scenario::study::StudyMode;
+use needlebench_show::Block;
+use needlebench_show::number::in_percent;
 use needlebench_study::statistics::{ANY, Gap};
-
-use crate::number::in_percent;
-use crate::table::Block;
 
 /// Which cases are of postures only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,16 +38,16 @@ impl Postures {
     }
 }
 
-/// What the base scenario lets needles pass through, of bone, vessels and organs: it is no part of what works.
+/// The structures (bone, vessels, organs) whose clearance the base scenario does not check along the needle path.
 pub(crate) struct RouteLeftOut {
-    /// What is switched off, as the scenario names it.
+    /// The checks that are off, as the scenario names them.
     off: Vec<String>,
-    /// The margin that would hold, mm.
+    /// The margin that would be required, mm.
     pub least_mm: f64,
 }
 
 impl RouteLeftOut {
-    /// Of a study; none where the needle's route is judged.
+    /// Of a study; none where the whole needle path is checked.
     pub(crate) fn of(prepared: &PreparedStudy) -> Option<Self> {
         let route = &prepared.study.family.base().scenario.planning.needle_route;
         (!route.off.is_empty()).then(|| Self {
@@ -59,7 +58,7 @@ impl RouteLeftOut {
 
     pub(crate) fn in_words(&self) -> String {
         format!(
-            "needle route left out: needles may pass {} (`planning.needle_route.off`), and work all the same",
+            "Needle path not checked against {} (`planning.needle_route.off`): feasibility does not include it",
             self.off.join(", ")
         )
     }
@@ -69,18 +68,18 @@ impl RouteLeftOut {
 pub(crate) fn postures_headline(postures: Postures, found: Option<&Replanned>) -> Option<String> {
     let what = match postures {
         Postures::None => return None,
-        Postures::All => "postures only",
-        Postures::Some => "postures only in the static cases",
+        Postures::All => "Postures only",
+        Postures::Some => "Static cases: postures only",
     };
     let any = found.and_then(|found| Some((found, found.gaps.iter().find(|gap| gap.of == ANY)?)));
     let Some((found, any)) = any else {
         return Some(format!(
-            "{what}: whether a motion gets there is not known, and none was planned to see how often"
+            "{what}, motions not planned, not even in a sample of cases"
         ));
     };
     Some(format!(
-        "{what}: whether a motion gets there is not known. Of {} cases planned too, {} % work by their posture, \
-         {} % with a motion: {}",
+        "{what}, motions not planned. Of {} cases also planned, {} % are feasible as postures and {} % with a \
+         motion ({})",
         found.cases,
         share(any.by_postures, any),
         share(any.planned, any),
@@ -92,13 +91,13 @@ fn share(count: u64, gap: &Gap) -> String {
     in_percent(count as f64 / gap.cases.max(1) as f64)
 }
 
-/// `45 points less (27 to 60)`.
+/// `difference 45 percentage points, 95 % CI 27 to 60`.
 fn points(gap: &Gap) -> String {
     let (Some(difference), Some(interval)) = (gap.gap, gap.interval) else {
-        return "-".to_owned();
+        return "difference unknown".to_owned();
     };
     format!(
-        "{} points less (95 % interval {} to {})",
+        "difference {} percentage points, 95 % CI {} to {}",
         in_percent(difference),
         in_percent(interval.low),
         in_percent(interval.high)
@@ -127,22 +126,22 @@ pub(crate) fn postures_blocks(found: Option<&Replanned>) -> Vec<Block> {
         ]
     });
     let heading = Block::Heading(format!(
-        "what postures alone overstate: {} cases, drawn from {}, planned too",
+        "overestimate of postures only: {} cases, sampled from {}, also planned",
         found.cases, found.of
     ));
     let table = Block::table(
         [
             "configuration",
-            "ok by\nposture (%)",
-            "with a\nmotion (%)",
-            "gap\n(points)",
-            "95 %",
+            "feasible as\nposture (%)",
+            "with\nmotion (%)",
+            "difference\n(pp)",
+            "95 % CI",
             "motion\nonly",
         ],
         rows.collect(),
     );
     let line = Block::Lines(vec![
-        "motion only: cases that work with their motion and not by the posture that would be tried first"
+        "motion only: cases feasible with their motion, but not with the posture that is tried first"
             .to_owned(),
     ]);
     vec![heading, table, line]

@@ -2,9 +2,8 @@
 
 use needlebench_bench::study::RobustnessResult;
 use needlebench_bench::study::robustness::{RESOLUTION, Robustness, SmallestFound, Unaware};
+use needlebench_show::Block;
 use needlebench_study::statistics::Method;
-
-use crate::table::Block;
 
 /// All radii of a result.
 fn radii(found: &Robustness) -> impl Iterator<Item = &SmallestFound> {
@@ -14,19 +13,19 @@ fn radii(found: &Robustness) -> impl Iterator<Item = &SmallestFound> {
         .chain(stays.flat_map(|unaware| [&unaware.shift, &unaware.tilt]))
 }
 
-/// `35.51`, `none to 150`, with a mark where layouts in between cannot exist.
+/// `35.51`, `none up to 150`, with a mark where layouts in between are invalid.
 fn radius(found: &SmallestFound) -> String {
     let text = match &found.found {
         Some(breaking) if breaking.radius == 0.0 => "0".to_owned(),
         Some(breaking) => format!("{:.2}", breaking.radius),
-        None => format!("none to {}", found.limit),
+        None => format!("none up to {}", found.limit),
     };
     let gap = if found.impossible > 0 { "*" } else { "" };
     let open = if found.settled { "" } else { "?" };
     format!("{text}{gap}{open}")
 }
 
-/// How the radii were searched for, in words.
+/// The search method of the radii, in words.
 pub(crate) fn robustness_method(results: &[RobustnessResult]) -> Option<Method> {
     let first = &results.first()?.found;
     // Where it is broken as it stands nothing is searched.
@@ -37,10 +36,10 @@ pub(crate) fn robustness_method(results: &[RobustnessResult]) -> Option<Method> 
     Some(Method {
         numbers: "robustness radii".to_owned(),
         method: format!(
-            "the smallest move found to break a configuration, no bound: the first break along {} directions \
-             of shifts and {} of turns, a pattern search about the nearest, to {RESOLUTION} mm or deg, and \
-             evenly spread points of the ball within, repeated about each that breaks until none of {} does; \
-             layouts that cannot exist are neither breaks nor places where nothing breaks",
+            "the smallest displacement found that makes a configuration infeasible, not a bound: first failure along \
+             {} directions of translation and {} of rotation, pattern search around the nearest to {RESOLUTION} mm \
+             or deg, then evenly spread points of the ball inside, repeated around each failure until none of {} \
+             points fails; invalid layouts count neither as failures nor as feasible",
             first.shift.directions,
             first.tilt.directions,
             most(|found| found.points)
@@ -50,7 +49,7 @@ pub(crate) fn robustness_method(results: &[RobustnessResult]) -> Option<Method> 
     })
 }
 
-/// The radii as a table, with the rule that breaks.
+/// The radii as a table, with the rule or criterion that fails.
 pub(crate) fn robustness_blocks(results: &[RobustnessResult]) -> Vec<Block> {
     let rows = results
         .iter()
@@ -78,12 +77,12 @@ pub(crate) fn robustness_blocks(results: &[RobustnessResult]) -> Vec<Block> {
         })
         .collect();
     let mut lines = vec![
-        "Smallest shift, and turn about the vertical and the long axis, found to break the configuration: with \
-         its posture solved anew, and with the arm left where it stands. `summary.json` has the breaking cases."
+        "Smallest shift, and rotation about the vertical and the long axis, found to make the configuration \
+         infeasible: with the posture recomputed, and with the arm fixed. `summary.json` has the failing cases."
             .to_owned(),
     ];
     if let Some(method) = robustness_method(results) {
-        lines.push(format!("Found by search: {}.", method.method));
+        lines.push(format!("Search method: {}.", method.method));
     }
     let any = |pick: fn(&SmallestFound) -> bool| {
         let mut all = results.iter().flat_map(|result| radii(&result.found));
@@ -91,29 +90,27 @@ pub(crate) fn robustness_blocks(results: &[RobustnessResult]) -> Vec<Block> {
     };
     if any(|found| found.impossible > 0) {
         lines.push(
-            "*: some of the layouts within cannot exist, and count neither way; `summary.json` says how many."
+            "*: range contains invalid layouts (ignored); `summary.json` has their number."
                 .to_owned(),
         );
     }
     if any(|found| !found.settled) {
-        lines.push(
-            "?: nearer breaks were still being found when the search was given up.".to_owned(),
-        );
+        lines.push("?: search not converged; a smaller value may exist.".to_owned());
     }
     vec![
         Block::Heading(
-            "robustness: smallest moves of the patient of the base scenario found to break"
+            "robustness: smallest patient displacement found to cause failure, base scenario"
                 .to_owned(),
         ),
         Block::table(
             [
                 "goal",
                 "<configuration",
-                "shift\nmm",
-                "turn\ndeg",
-                "<breaks",
-                "arm stays\nmm",
-                "arm stays\ndeg",
+                "shift\n(mm)",
+                "rotation\n(deg)",
+                "<failure",
+                "arm fixed,\nshift (mm)",
+                "arm fixed,\nrotation (deg)",
             ],
             rows,
         ),
