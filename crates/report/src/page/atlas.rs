@@ -1,22 +1,22 @@
-//! The page of an atlas.
+//! The page of a roll map.
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::{Goal, ResolvedScenario};
+use needlebench_bench::atlas::{AtlasReport, BranchReport, GoalAtlas, GoalAtlasReport};
 use needlebench_planning::Member;
+use needlebench_scenario::{Goal, ResolvedScenario};
 use serde_json::{Value, json};
 
 use super::pack::Pack;
 use super::scene::{pose, surroundings};
 use super::viewer::Viewer;
 use crate::chart::atlas::rule_colors;
-use needlebench_bench::atlas::{AtlasReport, BranchReport, GoalAtlas, GoalAtlasReport};
 
 const SCRIPT: &str = include_str!("assets/atlas.js");
 /// Code of a roll at which nothing rejects the posture.
 const WORKS: u8 = u8::MAX;
 
-/// The page of a finished atlas: ranges, reasons, clearances and postures over the roll.
+/// The page of a finished roll map: ranges, reasons, clearances and postures over the roll.
 pub(crate) fn atlas_page(
     resolved: &ResolvedScenario,
     atlases: &[(&Goal, GoalAtlas)],
@@ -38,7 +38,7 @@ pub(crate) fn atlas_page(
         "scene": surroundings(resolved, &mut pack),
     });
     let page = Viewer {
-        kind: "atlas",
+        kind: "roll map",
         name: &report.scenario,
         description: &resolved.scenario.description,
         script: SCRIPT,

@@ -1,7 +1,7 @@
 //! Charts of a run as vector graphics in its page's document, and what a test by ISO 9283 adds to the scene.
 
 use needlebench_bench::{EventRun, ScenarioRun};
-use needlebench_cell::ResolvedScenario;
+use needlebench_scenario::ResolvedScenario;
 use serde_json::{Value, json};
 
 use super::pack::Pack;

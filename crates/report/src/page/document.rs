@@ -4,7 +4,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use quick_xml::escape::escape;
 
-/// A page in one file: it needs no other and can reach none.
+/// A self-contained page that can reach no other file.
 #[derive(Debug, Clone)]
 pub struct Document<'a> {
     /// Title, as text.
@@ -20,7 +20,7 @@ pub struct Document<'a> {
 impl Document<'_> {
     /// The whole file.
     pub fn html(&self) -> String {
-        // `connect-src` falls back to none: the page cannot ask anybody for anything.
+        // `connect-src` falls back to none: the page can make no requests.
         let may_run = if self.scripts.is_empty() {
             ""
         } else {

@@ -1,10 +1,11 @@
-//! What a run's page needs to try postures: the scene, the code that computes with it, and names.
+//! Data of a run's page for exploratory postures: the scene, the code that computes with it, and names.
 
-use needlebench_cell::{ClearanceClass, Frame, Goal, ResolvedScenario, Roll};
+use needlebench_cell::{ClearanceClass, Frame};
 use needlebench_kinematics::Pose;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_live::{Limits, Scene};
 use needlebench_planning::ClassLimits;
+use needlebench_scenario::{Goal, ResolvedScenario, Roll};
 use serde_json::{Value, json};
 
 use super::pack::Pack;
@@ -15,12 +16,12 @@ const CODE: &[u8] = include_bytes!("assets/live.wasm");
 /// Decimals of millimetres and degrees that a pose is shown with: more than a scenario gives.
 const DECIMALS: i32 = 6;
 
-/// The document's part on trying postures.
+/// The document's part on exploratory postures.
 pub(super) fn explore(resolved: &ResolvedScenario, pack: &mut Pack) -> Value {
     let cell = &resolved.cell;
     let scene = scene(resolved);
     let judged_m = scene.limits.judged_m;
-    // JSON has no infinity: where nothing is asked there is none.
+    // JSON has no infinity: a class without a limit has none.
     let classes: Vec<Value> = ClearanceClass::ALL
         .iter()
         .map(|class| {
@@ -113,10 +114,10 @@ fn goal(resolved: &ResolvedScenario, goal: &Goal) -> Value {
 mod tests {
     use std::path::Path;
 
-    use needlebench_cell::{Overrides, pose_of, resolve_scenario};
     use needlebench_clearance::ClearanceModel;
     use needlebench_live::{Live, Outcome};
     use needlebench_planning::{Member, Planner};
+    use needlebench_scenario::{Overrides, pose_of, resolve_scenario};
 
     use super::*;
 

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use needlebench_bench::{RunOptions, run_scenario};
-use needlebench_cell::{Overrides, load_scenario};
 use needlebench_engine::{ENGINES, Engine};
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::{Overrides, load_scenario};
 use serde_json::Value;
 
 use super::pack::unpack::of_page;
@@ -31,7 +31,7 @@ fn further_engine_has_its_columns_files_and_motions() {
         run_scenario(&resolved, &options).unwrap()
     };
     let finished = run(&["replay", "rapier"]);
-    let page = of_page(&run_page(&resolved, &finished));
+    let page = of_page(&run_page(&resolved, &finished, &finished.report));
     let mut simulated = 0;
     for (index, runs) in finished.runs[0].iter().enumerate() {
         let Some(last) = runs.last() else { continue };

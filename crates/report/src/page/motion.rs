@@ -1,11 +1,11 @@
 //! Recorded motions and clearances along them.
 
+use needlebench_bench::EngineRun;
 use needlebench_engine::Recording;
 use needlebench_evaluation::ClearanceSeries;
 use serde_json::{Value, json};
 
 use super::pack::Pack;
-use needlebench_bench::EngineRun;
 
 /// Time between two postures of a replay, s. Between them joints turn by far less than shows: at the
 /// UR3's 20 rad/s^2 a chord leaves the course by 4 mrad at most, at planned speeds by a tenth of it.
@@ -13,7 +13,7 @@ const POSTURE_PERIOD_S: f64 = 0.04;
 /// Points of a clearance curve: as many as a plot has pixels.
 const MOST_POINTS: usize = 700;
 
-/// The document's part on one engine's motion. What is nearest is told of the `first` one alone: where it
+/// The document's part on one engine's motion. Closest pairs are stored for the `first` one alone: where it
 /// came to its end, engines agree to far less than shows.
 pub(super) fn motion(run: &EngineRun, first: bool, stopped: bool, pack: &mut Pack) -> Value {
     let (time_s, joints) = postures(&run.recording, pack);
@@ -30,7 +30,7 @@ pub(super) fn motion(run: &EngineRun, first: bool, stopped: bool, pack: &mut Pac
     })
 }
 
-/// What is nearest over time: pairs by their names, and per sample its time, its pair (255 for none) and
+/// The closest pair over time: pairs by their names, and per sample its time, its pair (255 for none) and
 /// the two nearest points in the world.
 fn nearest(series: &ClearanceSeries, pack: &mut Pack) -> Value {
     let period_s = |window: &[f64]| window[1] - window[0];

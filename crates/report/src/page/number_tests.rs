@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use needlebench_evaluation::metric::Show;
+use needlebench_show::number::{measured, percent, small_length, three_digits, value_and_limit};
 use serde_json::{Value, json};
 
-use crate::number::{measured, percent, shown, small_length, three_digits, value_and_limit};
-use needlebench_evaluation::metric::Show;
+use crate::table::shown::metric_text;
 
 const FILE: &str = "../../tests/page/numbers.json";
 /// Set, the file is written anew.
@@ -60,7 +61,7 @@ fn cases() -> Value {
     let shows: Vec<Value> = shows
         .into_iter()
         .flat_map(|(name, show)| {
-            signed().map(move |value| json!([name, value, shown(show, value)]))
+            signed().map(move |value| json!([name, value, metric_text(show, value)]))
         })
         .collect();
     let limits: Vec<Value> = ["m", "rad", "1", "N", "N m", "s"]

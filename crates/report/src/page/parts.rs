@@ -4,10 +4,11 @@ use std::fmt::Write;
 
 use quick_xml::escape::escape;
 
+use needlebench_show::chart::Chart;
+use needlebench_show::{Block, has_words, heading};
+
 use super::document::{Document, png_address};
 use super::shared;
-use crate::chart::Chart;
-use crate::table::{Block, has_words, heading};
 
 const STYLE: &str = "main > * { max-width: 1300px; }
 main p { max-width: 80ch; }

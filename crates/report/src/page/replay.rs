@@ -6,11 +6,11 @@ use needlebench_bench::replay::ReplayReport;
 use needlebench_evaluation::report::Verdict;
 use needlebench_kinematics::JOINT_LABELS;
 use needlebench_recorded::{Estimate, Tracking};
+use needlebench_show::chart::Chart;
+use needlebench_show::number::{rounded, value_and_limit};
 use quick_xml::escape::escape;
 
 use super::document::Document;
-use crate::chart::Chart;
-use crate::number::{rounded, value_and_limit};
 use crate::table::replay::{pose_errors, shown, small};
 
 const STYLE: &str = concat!(
@@ -20,7 +20,7 @@ const STYLE: &str = concat!(
 );
 
 const CORE: &str = include_str!("assets/core.js");
-/// Boxes that scroll say so.
+/// Hints below boxes that scroll.
 const HINTS: &str = "for (const box of document.querySelectorAll('.scroll')) NB.hint(box);\n\
                      document.documentElement.dataset.ready = 'true';\n";
 
@@ -51,7 +51,7 @@ fn body(out: &mut String, report: &ReplayReport, chart: Option<&Chart>) -> std::
     )?;
     writeln!(
         out,
-        "<p>A recorded run of {:.1} s, {} rows at {:.4} s, and its replay with a {} ({}).</p>",
+        "<p>Recorded run of {:.1} s ({} rows at {:.4} s) and its replay with a {} ({}).</p>",
         log.duration_s,
         log.source.rows,
         log.period_s,
@@ -79,13 +79,13 @@ fn body(out: &mut String, report: &ReplayReport, chart: Option<&Chart>) -> std::
     }
     calibration(out, report)?;
     identification(out, report)?;
-    section(out, "What was found and assumed", true)?;
+    section(out, "Results and assumptions", true)?;
     writeln!(out, "<ul class=\"plain\">")?;
     for line in report.notes.iter().chain(&report.replayed) {
         writeln!(out, "<li>{}</li>", escape(&**line))?;
     }
     writeln!(out, "</ul></details>")?;
-    section(out, "Where the numbers come from", false)?;
+    section(out, "Provenance", false)?;
     let provenance = &report.provenance;
     writeln!(
         out,
@@ -159,7 +159,7 @@ fn criteria(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
     let judged = report.criteria.iter().map(|result| {
         let of = |value: Option<f64>| value.unwrap_or(f64::NAN);
         let (value, limit) = value_and_limit(of(result.value), of(result.limit), result.unit);
-        let verdict = if result.pass { "met" } else { "missed" };
+        let verdict = if result.pass { "met" } else { "failed" };
         vec![
             result.criterion.clone(),
             engine(&result.engine),
@@ -169,7 +169,7 @@ fn criteria(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
         ]
     });
     let open = report.not_judged.iter().map(|open| {
-        let reason = format!("not judged: {}", open.reason);
+        let reason = format!("not evaluated: {}", open.reason);
         vec![
             open.criterion.clone(),
             engine(&open.engine),
@@ -180,7 +180,7 @@ fn criteria(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
     });
     table(
         out,
-        &["criterion", "engine", "value", "limit", ""],
+        &["criterion", "engine", "value", "limit", "result"],
         judged.chain(open),
     )?;
     writeln!(out, "</details>")
@@ -199,7 +199,7 @@ fn following(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
         return Ok(());
     }
     section(out, "Real arm and engines", true)?;
-    let mut header = vec!["following the set-points"];
+    let mut header = vec!["tracking of the set-points"];
     header.extend(columns.iter().map(|(name, _)| *name));
     let row = |name: String, of: &dyn Fn(&Tracking) -> String| {
         let mut cells = vec![name];
@@ -212,7 +212,7 @@ fn following(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
         shown(&each.lag_of_all_s, 1e3)
     })];
     for (joint, label) in JOINT_LABELS.iter().enumerate() {
-        rows.push(row(format!("{label}, rms and largest (mrad)"), &|each| {
+        rows.push(row(format!("{label}, RMS and maximum (mrad)"), &|each| {
             format!(
                 "{}, {}",
                 rounded(each.rms_rad[joint] * 1e3, 3),
@@ -221,7 +221,7 @@ fn following(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
         }));
     }
     rows.push(row(
-        "tip 200 mm beyond the flange, rms and largest (mm)".to_owned(),
+        "tip 200 mm beyond the flange, RMS and maximum (mm)".to_owned(),
         &|each| {
             format!(
                 "{}, {}",
@@ -230,13 +230,16 @@ fn following(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
             )
         },
     ));
-    rows.push(row("the same at rest (mm)".to_owned(), &|each| {
-        format!(
-            "{}, {}",
-            millimetres(each.standing_tip_rms_m),
-            millimetres(each.standing_tip_largest_m)
-        )
-    }));
+    rows.push(row(
+        "the same tip at rest, RMS and maximum (mm)".to_owned(),
+        &|each| {
+            format!(
+                "{}, {}",
+                millimetres(each.standing_tip_rms_m),
+                millimetres(each.standing_tip_largest_m)
+            )
+        },
+    ));
     table(out, &header, rows)?;
     if !report.engines.is_empty() {
         let mut header = vec!["joint"];
@@ -245,8 +248,8 @@ fn following(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
             .keys()
             .flat_map(|name| {
                 [
-                    format!("{name}: torque less target_moment, rms (N m)"),
-                    format!("{name}: current less actual_current, rms (A)"),
+                    format!("{name}: torque minus target_moment, RMS (N m)"),
+                    format!("{name}: current minus actual_current, RMS (A)"),
                 ]
             })
             .collect();
@@ -272,8 +275,8 @@ fn calibration(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
     section(out, "Calibration", true)?;
     writeln!(
         out,
-        "<p>{}: what counts is the error on poses that it has not seen.</p>",
-        if fit.is_worth { "Kept" } else { "Not kept" }
+        "<p>{}, by the error on held-out poses.</p>",
+        if fit.is_worth { "Accepted" } else { "Rejected" }
     )?;
     let rows = pose_errors(fit).map(|(name, error)| {
         vec![
@@ -286,10 +289,10 @@ fn calibration(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
     table(
         out,
         &[
-            "poses of the tool's point",
-            "rms (mm)",
-            "largest (mm)",
-            "rms (mrad)",
+            "poses of the tool point",
+            "RMS (mm)",
+            "maximum (mm)",
+            "RMS (mrad)",
         ],
         rows,
     )?;
@@ -310,7 +313,7 @@ fn calibration(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
         cells
     });
     let header = [
-        "origin less nominal",
+        "origin minus nominal",
         "x (mm)",
         "y (mm)",
         "z (mm)",
@@ -321,8 +324,8 @@ fn calibration(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
     table(out, &header, rows)?;
     writeln!(
         out,
-        "<p class=\"soft\">- : poses do not tell it from other numbers, such as a shift along an axis of \
-         turning.</p></details>"
+        "<p class=\"soft\">-: not identifiable from these poses, such as a shift along an axis of \
+         rotation.</p></details>"
     )
 }
 
@@ -334,16 +337,16 @@ fn identification(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
     section(out, "Identification", true)?;
     writeln!(
         out,
-        "<p class=\"soft\">+- is half of a 95 % interval; in parentheses: the run does not show it well \
-         enough to be used.</p>"
+        "<p class=\"soft\">+-: half-width of the 95 % CI; in parentheses: not identified well enough by this \
+         run to be used.</p>"
     )?;
     if let Some(fit) = &found.controller {
         writeln!(
             out,
-            "<h3>What the controller believes, from target_moment</h3><p>Gravity {} m/s\u{b2}; links {}.</p>",
+            "<h3>Controller model, from target_moment</h3><p>Gravity {} m/s\u{b2}; links {}.</p>",
             escape(shown(&fit.gravity_m_s2, 1.0)),
             if fit.has_tensors {
-                "with their tensors"
+                "with their inertia tensors"
             } else {
                 "as points at their centres of mass"
             }
@@ -361,8 +364,8 @@ fn identification(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
             &[
                 "joint",
                 "rotor (kg m\u{b2})",
-                "left, rms (N m)",
-                "held out, rms (N m)",
+                "residual, RMS (N m)",
+                "held out, RMS (N m)",
             ],
             rows,
         )?;
@@ -385,10 +388,10 @@ fn identification(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
         let header = [
             "joint",
             "torque constant (N m/A)",
-            "sliding friction (N m)",
+            "Coulomb friction (N m)",
             "viscous friction (N m s/rad)",
-            "held out, rms (A)",
-            "measured current, rms (A)",
+            "held out, RMS (A)",
+            "measured current, RMS (A)",
         ];
         table(out, &header, rows)?;
     }
@@ -406,9 +409,9 @@ fn identification(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
         let header = [
             "joint",
             "rotor (kg m\u{b2})",
-            "sliding friction (N m)",
+            "Coulomb friction (N m)",
             "viscous friction (N m s/rad)",
-            "held out, rms (N m)",
+            "held out, RMS (N m)",
         ];
         table(out, &header, rows)?;
         loads(out, &fit.loads)?;

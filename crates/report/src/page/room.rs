@@ -1,12 +1,12 @@
-//! People, what they see, and the space that is left to them.
+//! People, their lines of sight, and the free space.
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::ResolvedScenario;
-use needlebench_cell::people::Person;
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_evaluation::room::{RoomModel, sight_segments};
 use needlebench_kinematics::Joints;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::people::Person;
 use serde_json::{Value, json};
 
 use super::mesh::surface;
@@ -14,11 +14,11 @@ use super::pack::Pack;
 use super::scene::pose;
 use crate::picture::voxel_surface;
 
-/// Lines of sight that are drawn per stature, half to the skin and half to the needle, as in the
+/// Lines of sight that are shown per stature, half to the skin and half to the needle, as in the
 /// pictures.
 const LINES_DRAWN: u32 = 8;
 
-/// People and the half ball about a goal's entry point.
+/// People and the hemisphere about a goal's entry point.
 pub(super) fn people(resolved: &ResolvedScenario, room: &RoomModel<'_>, goal: usize) -> Value {
     let sector = room.sector(goal);
     let (center, out) = (sector.center_m, sector.outwards);
@@ -52,7 +52,7 @@ fn person(person: &Person) -> Value {
     })
 }
 
-/// What a configuration leaves of it: lines of sight, the space that it takes, the hand's cone.
+/// Lines of sight, occupied space and hand cone of a configuration.
 pub(super) fn configuration(
     resolved: &ResolvedScenario,
     room: &RoomModel<'_>,

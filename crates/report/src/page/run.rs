@@ -1,11 +1,13 @@
 //! The page of a run.
 
-use needlebench_cell::{ClearanceClass, ResolvedScenario};
+use needlebench_bench::ScenarioRun;
+use needlebench_cell::ClearanceClass;
 use needlebench_engine::ENGINES;
 use needlebench_evaluation::metric::{Heading, Show};
 use needlebench_evaluation::report::{GoalReport, Report};
 use needlebench_evaluation::room::RoomModel;
 use needlebench_kinematics::Joints;
+use needlebench_scenario::ResolvedScenario;
 use serde_json::{Value, json};
 
 use super::charts;
@@ -18,8 +20,7 @@ use super::viewer::Viewer;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::shown::{Shown, shown_metrics};
 use crate::table::true_target::true_target_in_words;
-use crate::table::verdict::{counts, missed_as_expected};
-use needlebench_bench::ScenarioRun;
+use crate::table::verdict::{counts, missed_as_expected, qualifying};
 
 /// The script of the page, after those of what it has in it.
 const SCRIPT: &str = concat!(
@@ -31,9 +32,12 @@ const SCRIPT: &str = concat!(
 
 /// The page of a finished run: everything of its report but the timings, the cell, and all recorded
 /// motions.
-pub(crate) fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
+pub(crate) fn run_page(
+    resolved: &ResolvedScenario,
+    finished: &ScenarioRun,
+    report: &Report,
+) -> String {
     let mut pack = Pack::default();
-    let report = &finished.report;
     let mut document = json!({
         "kind": "run",
         "report": serde_json::to_value(report).expect("reports are plain data"),
@@ -57,6 +61,7 @@ pub(crate) fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> S
         .collect();
     document["goals"] = json!(goals);
     document["counts"] = json!(counts(report));
+    document["qualifying"] = json!(qualifying(report).collect::<Vec<_>>());
     let expected = report.criteria.iter().enumerate();
     let expected = expected.filter(|(_, result)| missed_as_expected(report, result));
     document["missedAsExpected"] = json!(expected.map(|(index, _)| index).collect::<Vec<_>>());
@@ -75,7 +80,7 @@ pub(crate) fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> S
     page.html(pack, &document)
 }
 
-/// Names of sources of error budgets that say what they rest on, and how.
+/// Names of sources of error budgets that have a basis, with it in words.
 fn localisations(report: &Report) -> impl Iterator<Item = (&'static str, &'static str)> {
     let configurations = report.goals.iter().flat_map(|goal| &goal.configurations);
     let budgets = configurations.filter_map(|each| each.budget.as_ref());
@@ -172,7 +177,7 @@ fn goal(
 mod tests {
     use std::path::Path;
 
-    use needlebench_cell::{Overrides, ResolvedScenario, load_scenario, resolve_scenario};
+    use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario, resolve_scenario};
 
     use super::*;
     use crate::page::pack::unpack::of_page;
@@ -202,18 +207,21 @@ mod tests {
         let page_of = |text: &str| {
             let resolved = resolve(text);
             let finished = run_scenario(&resolved, &options).unwrap();
-            of_page(&run_page(&resolved, &finished)).document
+            of_page(&run_page(&resolved, &finished, &finished.report)).document
         };
         let page = page_of(&format!("{}\n{MEASURED}", SMALL.replace(length, &lesion)));
         let said = page["goals"][0]["trueTarget"].as_str().unwrap();
-        assert!(said.starts_with("true lesion: tip 4.00 mm off, "), "{said}");
+        assert!(
+            said.starts_with("true lesion: tip error 4.00 mm, "),
+            "{said}"
+        );
         assert_eq!(
             page["words"]["registration"],
             "marker localisation, measured"
         );
         assert_eq!(page["words"]["imaging"], "target localisation, assumed");
         let columns = page["goals"][0]["columns"]["table"].to_string();
-        assert!(columns.contains("From the true lesion"), "{columns}");
+        assert!(columns.contains("Distance to true lesion"), "{columns}");
         let page = page_of(SMALL);
         assert!(page["goals"][0]["trueTarget"].is_null());
         assert!(page["words"].get("registration").is_none());
@@ -229,7 +237,7 @@ mod tests {
             ..RunOptions::default()
         };
         let finished = run_scenario(&resolved, &options).unwrap();
-        let back = of_page(&run_page(&resolved, &finished));
+        let back = of_page(&run_page(&resolved, &finished, &finished.report));
         assert!(back.document["report"].get("timings").is_none());
         let mut seen = 0;
         for (index, runs) in finished.runs[0].iter().enumerate() {

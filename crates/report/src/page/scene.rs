@@ -1,10 +1,11 @@
 //! The cell as surfaces, and the arm's chain.
 
-use needlebench_cell::fixtures::Fixture;
-use needlebench_cell::phantom::PhantomPart;
-use needlebench_cell::{ResolvedScenario, Robot, Tool};
+use needlebench_cell::{Robot, Tool};
 use needlebench_export::{MovesWith, Surfaces, surfaces_of_cell};
 use needlebench_kinematics::{Chain, Pose};
+use needlebench_phantom::PhantomPart;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::fixtures::Fixture;
 use serde_json::{Value, json};
 
 use super::mesh::{MOST_TRIANGLES, surface, thinned};

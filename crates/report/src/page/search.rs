@@ -21,14 +21,14 @@ const STYLE: &str = concat!(
     include_str!("assets/search.css")
 );
 
-/// Placements that are drawn: the winner and what else is as good.
+/// Placements that are rendered: the winner and candidates tied with it.
 const MOST_PICTURES: usize = 3;
 
-/// The page of a finished search: where the best is, how flat it is there, what else is as good, how it was found, and
-/// what the placements look like.
+/// The page of a finished search: the best candidate, the sensitivity about it, equivalent candidates, the progress,
+/// and images of the placements.
 ///
 /// # Errors
-/// Of the pictures.
+/// Failures of rendering.
 pub(crate) fn search_page(
     search: &PreparedSearch,
     log: &SearchLog,

@@ -1,8 +1,8 @@
-//! What pages that are not reports take from those that are: style, scripts, and the cell in three dimensions.
+//! Parts of report pages that other pages share: style, scripts, and the cell in three dimensions.
 
-use needlebench_cell::ResolvedScenario;
 use needlebench_evaluation::room::RoomModel;
 use needlebench_kinematics::Joints;
+use needlebench_scenario::ResolvedScenario;
 use serde_json::{Value, json};
 
 use super::pack::Pack;
@@ -32,7 +32,7 @@ pub fn scene(resolved: &ResolvedScenario) -> Vec<u8> {
     pack.bytes(&document)
 }
 
-/// The people at a goal, what they see past a posture, and where the guide is, for `View`.
+/// The people at a goal, their lines of sight past a posture, and the guide's pose, for `View`.
 pub fn people(
     resolved: &ResolvedScenario,
     model: &RoomModel<'_>,

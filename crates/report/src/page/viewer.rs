@@ -16,7 +16,7 @@ const SVG: &str = include_str!("assets/svg.js");
 
 /// What a page says before its scripts run, and which script is its own.
 pub(super) struct Viewer<'a> {
-    /// `run`, `atlas` or `study`.
+    /// Kind of the page, before the name in its title: `run`, `roll map`, `study` or `search`.
     pub kind: &'static str,
     /// Name of the scenario or study.
     pub name: &'a str,
@@ -34,7 +34,7 @@ impl Viewer<'_> {
         let body = format!(
             "<header class=\"top\"><h1>{}</h1><p>{}</p></header>\n\
              <main id=\"app\"><p id=\"loading\">Loading ...</p>\n\
-             <noscript><p>This page draws its contents with JavaScript, which is switched off. The same \
+             <noscript><p>This page needs JavaScript, which is switched off. The same \
              results are in the JSON file beside it.</p></noscript></main>\n\
              <script type=\"application/octet-stream\" id=\"payload\">{}</script>\n\
              <!-- three.js, MIT licence: a script once inflated -->\n\

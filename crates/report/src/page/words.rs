@@ -1,7 +1,7 @@
-//! What people in the room call things: the page's dictionary.
+//! The page's dictionary: words for names.
 
-use needlebench_cell::ResolvedScenario;
 use needlebench_evaluation::metric::metrics;
+use needlebench_scenario::ResolvedScenario;
 use serde_json::{Map, Value, json};
 
 /// Classes of clearance, rules and criteria, besides those that are metrics.
@@ -14,41 +14,44 @@ const NAMES: [(&str, &str); 31] = [
     ("robot_mount", "arm to its mount"),
     ("robot_obstacle", "arm to obstacles"),
     ("robot_person", "arm to people"),
-    ("self", "arm to itself"),
-    ("needle_corridor", "space behind the guide"),
-    ("needle_route", "needle's way in"),
+    ("self", "self-clearance"),
+    ("needle_corridor", "access zone"),
+    ("needle_route", "needle path"),
     ("unreachable", "out of reach"),
-    ("merged", "same as another configuration"),
-    ("nearest_only", "only nearly reached"),
+    ("merged", "coincides with another configuration"),
+    ("nearest_only", "reached only approximately"),
     ("joint_limit", "joint limit"),
     ("singular", "singular posture"),
     ("too_close", "too close"),
     ("no_motion", "no motion found"),
     ("expected", "outcome as expected"),
     ("allow_contact", "no contact"),
-    ("min_working_configurations", "configurations that work"),
+    ("min_working_configurations", "feasible configurations"),
     (
         "engines.envelope.peak_tip_um",
-        "engines' tips apart on the way",
+        "tip difference between engines, in motion",
     ),
     (
         "engines.envelope.settled_tip_nm",
-        "engines' tips apart at rest",
+        "tip difference between engines, settled",
     ),
     (
         "engines.envelope.joint_torque_nm",
-        "engines' joint torques apart",
+        "joint torque difference between engines",
     ),
     (
         "events.max_retraction_deviation_mm",
-        "way back: guide off the needle's axis",
+        "retreat: lateral guide deviation",
     ),
-    ("events.stop.max_tip_distance_mm", "stop: way of the tip"),
-    ("events.stop.max_stopping_time_s", "stop: time to a stand"),
-    ("max_force_difference", "engines' forces apart"),
-    ("max_balance_difference", "force off the balance of torques"),
-    ("max_tip_difference_mm", "engines' tips apart"),
-    ("max_recovery_s", "time to recover"),
+    ("events.stop.max_tip_distance_mm", "stop: tip travel"),
+    ("events.stop.max_stopping_time_s", "stop: stopping time"),
+    ("max_force_difference", "force difference between engines"),
+    (
+        "max_balance_difference",
+        "deviation from static equilibrium",
+    ),
+    ("max_tip_difference_mm", "tip difference between engines"),
+    ("max_recovery_s", "recovery time"),
 ];
 
 /// Words for the names that the documents of pages use.

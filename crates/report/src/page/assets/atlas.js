@@ -1,19 +1,19 @@
-// The page of an atlas: what works at which roll, by what margin, and why not.
+// The page of a roll map: feasible rolls, clearances, and reasons for rejection.
 'use strict';
 
-/** Colour and hatching of what works and of the rules that reject; the text under the cursor tells them apart, too. */
+/** Colour and hatching of feasible rolls and of the rules that reject; the text under the cursor names them, too. */
 NB.ruleStyle = (colors, name) => {
   const at = Object.keys(colors).indexOf(name);
   return [colors[name] || '#999999', name === 'works' || name === 'unreachable' || at < 0 ? 0 : (at % 3) + 1];
 };
 
-/** What a roll is best at. */
+/** What a roll is optimised for. */
 NB.aims = {
   clearance: 'clearance',
-  joint_margin: 'distance from the joint limits',
+  joint_margin: 'joint-limit margin',
   singularity: 'distance from singularities',
-  tip_accuracy: 'accuracy of the tip',
-  balanced: 'all aims together',
+  tip_accuracy: 'tip accuracy',
+  balanced: 'all aims combined',
 };
 
 class AtlasPage {
@@ -49,12 +49,12 @@ class AtlasPage {
     this.arm = this.view.arm('arm');
     this.curves = new Curves({
       height: 240,
-      label: 'Clearance of each class over the roll',
+      label: 'Clearance by class over roll',
       xTitle: 'roll (deg)',
       yTitle: 'clearance (mm)',
       seek: (roll) => this.setRoll(roll),
     });
-    this.strips = new Canvas(300, 'Which configuration works at which roll', (...all) => this.paint(...all));
+    this.strips = new Canvas(300, 'Feasibility of each configuration over roll', (...all) => this.paint(...all));
     this.stripLegend = NB.el('div', { class: 'legend' });
     /** @param {PointerEvent} event */
     const pick = (event) => {
@@ -113,15 +113,15 @@ class AtlasPage {
       vessel: 'vessels',
       lesion: 'lesions',
       marker: 'markers',
-      corridor: 'needle corridor',
-      needle: 'needle line',
+      corridor: 'access zone',
+      needle: 'needle axis',
     };
     app.append(
       NB.el('p', {
         class: 'soft',
         text:
-          'Every configuration over the roll of the guide about the needle: where it works, how near anything ' +
-          'comes in its final posture, and what stands against it elsewhere. Motions are not planned here.',
+          'Every configuration over the roll of the guide about the needle: feasible roll ranges, clearance of ' +
+          'the final posture, and the reason for rejection elsewhere. Motions are not planned.',
       }),
       NB.el(
         'div',
@@ -129,7 +129,7 @@ class AtlasPage {
         NB.el('strong', { text: 'Goal' }),
         NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons),
         NB.copyLink(),
-        NB.pngButton(this.view, 'The view', () => this.fileName(`${NB.plain.shown.millimetres(this.roll / 1e3)}deg`)),
+        NB.pngButton(this.view, '3D view', () => this.fileName(`${NB.plain.shown.millimetres(this.roll / 1e3)}deg`)),
       ),
       NB.el(
         'div',
@@ -151,8 +151,8 @@ class AtlasPage {
             NB.el(
               'div',
               { class: 'figure-head' },
-              NB.el('h3', { text: 'What works at which roll' }),
-              NB.saveButton('SVG', 'What works at which roll', () => [
+              NB.el('h3', { text: 'Feasibility over roll' }),
+              NB.saveButton('SVG', 'Feasibility over roll', () => [
                 `${this.fileName('atlas')}.svg`,
                 this.stripsSvg(),
                 'image/svg+xml',
@@ -196,8 +196,8 @@ class AtlasPage {
           ),
         ),
       ),
-      NB.section('Ranges of roll that work', true, this.table),
-      NB.section('Where the numbers come from', false, NB.provenance(page.provenance)),
+      NB.section('Feasible roll ranges', true, this.table),
+      NB.section('Provenance', false, NB.provenance(page.provenance)),
     );
     this.branchIndex = 0;
     this.roll = 0;
@@ -307,7 +307,7 @@ class AtlasPage {
     this.title.textContent = `Clearance over roll: ${branch.label}`;
     const x = Float32Array.from({ length: goal.rolls }, (_, k) => (360 * k) / goal.rolls);
     const bands = branch.ranges.flatMap((range) =>
-      this.pieces(range).map(([from, to]) => ({ from, to, text: 'works', color: '#e3f0f9' })),
+      this.pieces(range).map(([from, to]) => ({ from, to, text: 'feasible', color: '#e3f0f9' })),
     );
     this.curves.set(
       branch.curves.map(([name, y]) => ({ name, x, y, ...NB.styleOf(name) })),
@@ -344,7 +344,7 @@ class AtlasPage {
     this.arm.show(has);
     if (has) this.arm.pose(this.page.scene.chain, joints);
     const rule = branch.rules[at];
-    const text = rule === 255 ? '\u2713 works' : `\u2717 ${NB.words(branch.ruleNames[rule])}`;
+    const text = rule === 255 ? '\u2713 feasible' : `\u2717 ${NB.words(branch.ruleNames[rule])}`;
     const where = `${NB.fixed(this.roll, 1)}\u00b0 \u00b7 ${branch.label}`;
     this.clock.textContent = `${where}: ${text}${has ? '' : ', no posture'}`;
     this.slider.setAttribute('aria-valuetext', this.clock.textContent);
@@ -357,7 +357,7 @@ class AtlasPage {
       const code = decoded.rules[at];
       this.sideCells[index].replaceChildren(
         code === 255
-          ? NB.el('span', { class: 'good', text: '\u2713 works' })
+          ? NB.el('span', { class: 'good', text: '\u2713 feasible' })
           : NB.el('span', { class: 'off', text: NB.words(each.ruleNames[code]) }),
       );
     });
@@ -371,7 +371,7 @@ class AtlasPage {
       [
         { title: 'Configuration', cell: (b) => b.label },
         { title: 'At this roll', cell: () => '' },
-        { title: 'Works over', unit: 'deg', numeric: true, cell: (b) => NB.deg(total(b), 0) },
+        { title: 'Feasible range', unit: 'deg', numeric: true, cell: (b) => NB.deg(total(b), 0) },
       ],
       this.goal.branches,
       { class: 'choose small full' },
@@ -384,12 +384,12 @@ class AtlasPage {
       table,
       this.goal.fixedRoll === null
         ? null
-        : NB.el('p', { class: 'soft small', text: `The goal fixes the roll at ${NB.deg(this.goal.fixedRoll)}\u00b0.` }),
+        : NB.el('p', { class: 'soft small', text: `Roll fixed by the goal: ${NB.deg(this.goal.fixedRoll)}\u00b0.` }),
     );
   }
 
   /**
-   * How far a configuration can turn about the needle, over all its ranges.
+   * Width of all feasible roll ranges of a configuration.
    * @param {Branch | DecodedBranch} branch
    */
   turns(branch) {
@@ -397,7 +397,7 @@ class AtlasPage {
   }
 
   /**
-   * The configuration with most room to turn, the first of equals; -1 where none works.
+   * The configuration with the largest feasible roll range, the first of equals; -1 where none is feasible.
    * @param {AtlasGoal} goal
    */
   freest(goal) {
@@ -417,7 +417,7 @@ class AtlasPage {
     /** @param {RollRange['before'] | undefined} found */
     const edge = (found) => (found ? `${NB.words(found.rule)}: ${found.detail}` : '');
     const table = NB.table(
-      `Goal ${NB.words(goal.name)}: what stands against the rolls before and after each range; best roll for ` +
+      `Goal ${NB.words(goal.name)}: reason for rejection before and after each range; best roll for ` +
         `${NB.aims[goal.aim] || NB.words(goal.aim)}`,
       [
         { title: 'Configuration', cell: ({ branch }) => branch.label },
@@ -425,7 +425,7 @@ class AtlasPage {
           title: 'From',
           unit: 'deg',
           numeric: true,
-          cell: ({ range }) => (range ? (range.is_whole_circle ? 'all round' : NB.deg(range.from_rad, 2)) : 'nowhere'),
+          cell: ({ range }) => (range ? (range.is_whole_circle ? 'full circle' : NB.deg(range.from_rad, 2)) : 'none'),
         },
         {
           title: 'To',
@@ -436,8 +436,8 @@ class AtlasPage {
               ? `${NB.deg(range.to_rad % (2 * Math.PI), 2)}${range.to_rad > 2 * Math.PI ? ', past 360' : ''}`
               : '',
         },
-        { title: 'Before it', text: true, cell: ({ range }) => edge(range?.before) },
-        { title: 'After it', text: true, cell: ({ range }) => edge(range?.after) },
+        { title: 'Rejected before', text: true, cell: ({ range }) => edge(range?.before) },
+        { title: 'Rejected after', text: true, cell: ({ range }) => edge(range?.after) },
         {
           title: 'Best roll',
           unit: 'deg',
@@ -445,13 +445,14 @@ class AtlasPage {
           cell: ({ range }) => (range ? NB.deg(range.best[goal.aim].roll_rad, 2) : ''),
         },
         {
-          title: 'Least clearance there',
+          title: 'Smallest distance there',
           unit: 'mm',
+          help: 'over all classes that change with the roll, self-clearance included',
           numeric: true,
           cell: ({ range }) => (range ? NB.mm(range.best[goal.aim].least_clearance_m) : ''),
         },
         {
-          title: 'Between',
+          title: 'Pair',
           cell: ({ range }) => [...new Set((range?.best[goal.aim].pair || []).map(NB.words))].join(' to '),
         },
       ],
@@ -473,10 +474,10 @@ class AtlasPage {
       ),
     );
     const working = goal.branches.filter((branch) => branch.ranges.length).length;
-    let answer = `${working} of ${goal.branches.length} configurations work`;
+    let answer = `${working} of ${goal.branches.length} configurations feasible`;
     if (freest >= 0) {
       const branch = goal.branches[freest];
-      answer += `; ${branch.label} has most room to turn, ${NB.deg(this.turns(branch), 0)} of 360\u00b0`;
+      answer += `; largest roll range: ${branch.label}, ${NB.deg(this.turns(branch), 0)} of 360\u00b0`;
     }
     NB.clear(this.table, NB.el('p', null, NB.el('strong', { text: `${answer}.` })), table);
   }
@@ -561,7 +562,7 @@ class AtlasPage {
       const key = ([name, style]) => {
         const canvas = NB.el('canvas', { width: '26', height: '14', 'aria-hidden': 'true' });
         this.block(NB.context(canvas), style, 0, 0, 26, 14);
-        return NB.el('span', { class: 'key' }, canvas, NB.words(name));
+        return NB.el('span', { class: 'key' }, canvas, name === 'works' ? 'feasible' : NB.words(name));
       };
       const rejecting = [...used].filter(([name]) => name !== 'works');
       NB.clear(
@@ -572,17 +573,17 @@ class AtlasPage {
         NB.el('span', {
           class: 'soft small',
           text:
-            'Black frame: a range that works, to the exact angle; diamond: its best ' +
-            `roll${this.fixedMark(this.goal) === null ? '' : '; dashed line: the roll that the goal fixes'}.`,
+            'Black frame: feasible range with exact limits; diamond: its best ' +
+            `roll${this.fixedMark(this.goal) === null ? '' : '; dashed line: roll fixed by the goal'}.`,
         }),
       );
     }
   }
 
   stripsSvg() {
-    const title = `${NB.words(this.goal.name)}: what works at which roll`;
+    const title = `${NB.words(this.goal.name)}: feasibility over roll`;
     /** @param {string} name */
-    const words = (name) => (name === 'works' ? 'works' : `rejected by: ${NB.words(name)}`);
+    const words = (name) => (name === 'works' ? 'feasible' : `rejected by: ${NB.words(name)}`);
     /** @type {Mark[]} */
     const legend = [...this.used].map(([name, style]) => ({
       text: words(name),

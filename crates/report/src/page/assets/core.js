@@ -104,12 +104,12 @@ NB.array = (reference) => {
   return values;
 };
 
-/** Runs a page's script and says so where it cannot run. */
+/** Runs a page's script and shows an error where it cannot run. */
 NB.start = async (build) => {
   const app = NB.byId('app');
   try {
     if (typeof DecompressionStream === 'undefined') {
-      throw new Error('this browser is too old: it has no DecompressionStream (from 2023 on, all have)');
+      throw new Error('this browser is too old: it lacks DecompressionStream (all browsers since 2023 have it)');
     }
     const [page] = await Promise.all([NB.read(), NB.load('three')]);
     app.replaceChildren();
@@ -149,7 +149,7 @@ NB.words = (name) =>
     .replaceAll('_', ' ');
 NB.dictionary = new Map();
 
-/** Where the half ball about the entry point is cut. */
+/** Regions of the hemisphere about the entry point. */
 NB.regionWords = {
   above: 'above',
   feet: 'towards the feet',
@@ -179,7 +179,7 @@ NB.address = {
     }, 150);
   },
 
-  /** Calls `apply(choices)` when somebody changes the address of the open page. */
+  /** Calls `apply(choices)` when the address of the open page is changed by hand. */
   watch(apply) {
     window.addEventListener('hashchange', () => {
       if (location.hash !== NB.address.written) apply(NB.address.read());
@@ -195,7 +195,7 @@ NB.copyLink = () => {
     {
       type: 'button',
       class: 'no-print',
-      title: 'Address of this page with what is chosen now',
+      title: 'Address of this page with the current selection',
       onclick: () => {
         /** @param {string} text */
         const said = (text) => {
@@ -208,7 +208,7 @@ NB.copyLink = () => {
           () =>
             (navigator.clipboard ? navigator.clipboard.writeText(location.href) : Promise.reject()).then(
               () => said('Copied'),
-              () => said('It is in the address bar'),
+              () => said('Copy it from the address bar'),
             ),
           200,
         );
@@ -219,7 +219,7 @@ NB.copyLink = () => {
   return button;
 };
 
-/** A table with a caption: `columns` of `{ title, unit, numeric, cell(row) }`. */
+/** A table with a caption: `columns` of `{ title, unit, numeric, cell(row) }`; units are in parentheses. */
 NB.table = (caption, columns, rows, options = {}) => {
   const head = NB.el(
     'tr',
@@ -233,7 +233,7 @@ NB.table = (caption, columns, rows, options = {}) => {
           title: column.help,
         },
         column.title,
-        column.unit ? NB.el('span', { class: 'unit', text: ` ${column.unit}` }) : null,
+        column.unit ? NB.el('span', { class: 'unit', text: ` (${column.unit})` }) : null,
       ),
     ),
   );
@@ -419,7 +419,7 @@ NB.provenance = (provenance, file) =>
       file ? [NB.el('dt', { text: 'file' }), NB.el('dd', { text: file })] : null,
       NB.el('dt', { text: 'seed' }),
       NB.el('dd', { text: String(provenance.seed) }),
-      NB.el('dt', { text: 'truth' }),
+      NB.el('dt', { text: 'ground truth' }),
       NB.el('dd', { text: provenance.truth }),
       NB.el('dt', { text: 'lock file' }),
       NB.el('dd', null, NB.el('code', { text: provenance.cargo_lock_sha256 })),
@@ -430,13 +430,13 @@ NB.provenance = (provenance, file) =>
     ),
     NB.el('p', {
       class: 'print-only',
-      text: `${provenance.inputs.length} files went in; report.json has their names and hashes.`,
+      text: `${provenance.inputs.length} input files; report.json has their names and hashes.`,
     }),
     NB.el(
       'div',
       { class: 'no-print' },
       NB.table(
-        'Files that went in',
+        'Input files',
         [
           { title: 'Role', cell: (input) => input.role },
           { title: 'File', cell: (input) => input.file },

@@ -1,4 +1,4 @@
-// Trying postures: the arm at any joint positions and its base at any place, with the clearances there.
+// Exploratory postures: the arm at any joint positions and base placement, with the clearances there.
 // The numbers are the program's own: its code, compiled to WebAssembly, comes with the page.
 'use strict';
 
@@ -78,7 +78,7 @@ class Live {
   }
 
   /**
-   * Moves the base: mm, and roll, pitch, yaw in degrees. Says why its mount cannot carry it there, or null.
+   * Moves the base: mm, and roll, pitch, yaw in degrees. Returns why its mount cannot carry it there, or null.
    * @param {Point} position
    * @param {number[]} rpy
    */
@@ -126,12 +126,12 @@ class Live {
   static OUTCOMES = ['unreachable', 'merged', 'joint_limit', 'singular', 'too_near', 'misses', 'works'];
 }
 
-/** How near is near, by what is asked: colours that people with any colour vision tell apart. */
+/** Distances in relation to the limit, in colours that people with any colour vision tell apart. */
 NB.NEARNESS = [
   { key: 'overlap', words: 'overlapping', color: [0.835, 0.369, 0], radius: 0.004 },
-  { key: 'missed', words: 'nearer than the limit', color: [0.902, 0.624, 0], radius: 0.003 },
-  { key: 'near', words: 'within 50 mm of the limit', color: [0.337, 0.706, 0.914], radius: 0.002 },
-  { key: 'far', words: 'farther', color: [0.46, 0.46, 0.46], radius: 0.0012 },
+  { key: 'missed', words: 'below the limit', color: [0.902, 0.624, 0], radius: 0.003 },
+  { key: 'near', words: 'up to 50 mm above the limit', color: [0.337, 0.706, 0.914], radius: 0.002 },
+  { key: 'far', words: 'more than 50 mm above', color: [0.46, 0.46, 0.46], radius: 0.0012 },
 ];
 NB.nearness = (distance, limit) => {
   const asked = limit ?? 0;
@@ -174,7 +174,7 @@ class Explore {
     this.status = NB.el('span', {
       class: 'soft',
       role: 'status',
-      text: 'Move the joints and the base by hand, with the clearances there.',
+      text: 'Jog the joints or move the base to see the clearances.',
     });
     this.bar = NB.el('div', { class: 'bar' }, this.open, this.status);
     this.body = NB.el('div', { hidden: true });
@@ -184,7 +184,7 @@ class Explore {
       this.bar,
       this.body,
     );
-    this.sign = NB.el('p', { class: 'tried-sign', hidden: true, text: 'Tried posture: not a result of the run' });
+    this.sign = NB.el('p', { class: 'tried-sign', hidden: true, text: 'Exploratory posture, not a result of the run' });
     this.view.element.append(this.sign);
     // What is printed are results.
     window.addEventListener('beforeprint', () => this.leave(), { capture: true });
@@ -199,7 +199,7 @@ class Explore {
     } catch (error) {
       this.open.disabled = true;
       this.status.textContent =
-        `Clearances cannot be computed here: ${error.message}. On the command line: ` +
+        `Clearances cannot be computed here: ${error.message}. Use the command line: ` +
         `${this.command(this.startJoints())}`;
       return;
     }
@@ -212,7 +212,7 @@ class Explore {
     this.arm ||= this.view.arm('tried');
     this.resetAll();
     this.sign.hidden = false;
-    // It says what the run's posture keeps.
+    // It has the clearance of the run's posture.
     this.run.now.hidden = true;
     this.view.element.classList.add('trying');
     this.applyLayers();
@@ -321,7 +321,7 @@ class Explore {
     this.problems = NB.el('div', { role: 'alert' });
     this.classes = NB.el('div');
     this.reached = NB.el('div');
-    this.text = NB.el('pre', { class: 'small', tabindex: '0', 'aria-label': 'The same on the command line' });
+    this.text = NB.el('pre', { class: 'small', tabindex: '0', 'aria-label': 'Command-line equivalent' });
     this.copied = NB.el('span', { class: 'soft', role: 'status' });
     /** @param {string} text @param {() => void} click */
     const button = (text, click, extra = {}) => NB.el('button', { type: 'button', onclick: click, ...extra }, text);
@@ -329,8 +329,8 @@ class Explore {
       NB.el('p', {
         class: 'tried-note',
         text:
-          'What is shown is this posture alone, not a result of the run: nothing is simulated, and no motion to it ' +
-          'is planned or proven. The blue ghost is the run\u2019s posture.',
+          'This posture is not a result of the run: it is not simulated, and no motion to it is planned or ' +
+          'certified. The blue ghost is the posture of the run.',
       }),
       NB.el(
         'div',
@@ -346,7 +346,7 @@ class Explore {
         NB.el(
           'fieldset',
           null,
-          NB.el('legend', { text: 'Base: drag the ring at its foot, or' }),
+          NB.el('legend', { text: 'Base: drag its ring or enter' }),
           NB.el(
             'div',
             { class: 'base-fields' },
@@ -375,7 +375,7 @@ class Explore {
         ),
       ),
       this.reached,
-      NB.el('h3', { text: 'The same on the command line' }),
+      NB.el('h3', { text: 'Command-line equivalent' }),
       this.text,
       NB.el(
         'div',
@@ -552,16 +552,18 @@ class Explore {
   showProblems() {
     const low = this.live.lowest(this.joints);
     const lines = [
-      this.refused ? `The base cannot go there: ${this.refused}.` : null,
+      this.refused ? `Invalid base placement: ${this.refused}.` : null,
       ...this.live
         .overlaps()
-        .map(({ body, other, depth }) => `The ${NB.words(body)} stands ${NB.mm(depth)} mm in the ${NB.words(other)}.`),
+        .map(
+          ({ body, other, depth }) => `The ${NB.words(body)} overlaps the ${NB.words(other)} by ${NB.mm(depth)} mm.`,
+        ),
       this.startHits
-        ? 'From here, the posture that the scenario starts in collides: ' +
+        ? 'With this base, the start posture of the scenario collides: ' +
           `${this.startHits.solids.map(NB.words).join(' and ')} overlap by ${NB.mm(-this.startHits.distance)} mm. ` +
-          'Give another one under [start].'
+          'Set another one under [start].'
         : null,
-      low < -0.001 ? `The arm reaches ${NB.mm(-low)} mm under the floor.` : null,
+      low < -0.001 ? `The arm reaches ${NB.mm(-low)} mm below the floor.` : null,
     ].filter(Boolean);
     const text = lines.join(' ');
     // Said once, and not at every step of a drag.
@@ -582,27 +584,27 @@ class Explore {
     const name = (pair) => this.data.classes[pair.class].name;
     /** @type {Column<LivePair>[]} */
     const columns = [
-      { title: 'Clearance of this posture', cell: (pair) => NB.words(name(pair)) },
+      { title: 'Class', cell: (pair) => NB.words(name(pair)) },
       {
-        title: 'Distance',
+        title: 'Clearance',
         unit: 'mm',
         numeric: true,
         cell: (pair) => NB.mm(pair.distance),
-        help: 'signed: negative where they overlap',
+        help: 'negative: penetration',
       },
       {
         title: 'Limit',
         unit: 'mm',
         numeric: true,
         cell: (pair) => NB.mm(this.limit(pair)),
-        help: 'the scenario\u2019s criterion, or what planning wants at least',
+        help: 'limit of the scenario\u2019s criterion, otherwise of its planning',
       },
-      { title: '', cell: (pair) => this.judgement(pair.distance, this.limit(pair)) },
-      { title: 'Between', cell: (pair) => pair.solids.map(NB.words).join(' and ') },
+      { title: 'Result', cell: (pair) => this.judgement(pair.distance, this.limit(pair)) },
+      { title: 'Pair', cell: (pair) => pair.solids.map(NB.words).join(' and ') },
     ];
     NB.clear(
       this.classes,
-      NB.table('Signed distances of this posture by class; not proven along any motion', columns, this.least, {
+      NB.table('Clearance of this posture by class; no motion is certified', columns, this.least, {
         class: 'small full',
       }),
     );
@@ -612,7 +614,7 @@ class Explore {
   judgement(distance, limit) {
     if (limit === null) return NB.el('span', { class: 'soft', text: 'no limit' });
     return distance >= limit
-      ? NB.el('span', { class: 'good', text: '\u2713 kept' })
+      ? NB.el('span', { class: 'good', text: '\u2713 satisfied' })
       : NB.el('span', { class: 'bad', text: distance < 0 ? '\u2717 collides' : '\u2717 too close' });
   }
 
@@ -641,7 +643,7 @@ class Explore {
     view.draw();
   }
 
-  /** Colours the links by what is nearest to them. */
+  /** Colours the links by their closest pair. */
   tint() {
     const worst = new Map();
     for (const pair of this.pairs) {
@@ -661,7 +663,7 @@ class Explore {
   }
 
   /**
-   * Which configurations reach the goal from here: at once from few rolls, where that is quick, and again from many
+   * Which configurations are feasible from here: at once with few rolls, where that is quick, and again with many
    * when all rests.
    */
   lookForConfigurations() {
@@ -669,7 +671,7 @@ class Explore {
       this.showReach(6, false);
       this.coarseInMs = this.reachedInMs;
     } else {
-      // What is shown is of another place: nothing of it can be taken.
+      // What is shown is of another place: none of it can be used.
       this.reached.dataset.rolls = 'of another place';
       for (const button of this.reached.querySelectorAll('button')) button.disabled = true;
     }
@@ -688,12 +690,12 @@ class Explore {
     if (!this.found.length) return;
     /** @type {{ [outcome: string]: [style: string, words: string] }} */
     const words = {
-      works: ['good', '\u2713 limits kept'],
-      misses: ['bad', '\u2717 limit missed'],
+      works: ['good', '\u2713 feasible'],
+      misses: ['bad', '\u2717 criterion failed'],
       too_near: ['bad', '\u2717 too close'],
-      singular: ['bad', '\u2717 near a singularity'],
+      singular: ['bad', '\u2717 singular posture'],
       joint_limit: ['off', '\u2013 beyond a joint limit'],
-      merged: ['off', '\u2013 same as another'],
+      merged: ['off', '\u2013 coincides with another'],
       unreachable: ['off', '\u2013 out of reach'],
     };
     /** @param {LivePosture} posture */
@@ -704,32 +706,32 @@ class Explore {
     };
     /** @type {Column<LivePosture>[]} */
     const columns = [
-      { title: 'From this base', cell: (each) => each.label },
+      { title: 'Configuration', cell: (each) => each.label },
       {
         title: 'Final posture',
         cell: (each) => NB.el('span', { class: words[each.outcome][0], text: words[each.outcome][1] }),
       },
-      { title: 'Nearest to its limit', cell: between },
+      { title: 'Closest to its limit', cell: between },
       { title: 'Roll', unit: '\u00b0', numeric: true, cell: (each) => (each.joints ? NB.deg(each.roll, 0) : '\u2013') },
       {
-        title: '',
+        title: 'Posture',
         cell: (each) =>
           NB.el(
             'button',
             {
               type: 'button',
               disabled: !each.joints,
-              'aria-label': `Take the posture of ${each.label}`,
+              'aria-label': `Use the posture of ${each.label}`,
               onclick: () => this.take(each),
             },
-            'Take',
+            'Use',
           ),
       },
     ];
     const count = this.found.filter((each) => each.outcome === 'works').length;
-    const at = free ? 'the best roll found about the needle' : 'the roll that the goal fixes';
+    const at = free ? 'the best roll found' : 'the roll fixed by the goal';
     const table = NB.table(
-      `Goal ${NB.words(this.run.goal.name)}: ${count} of ${this.found.length} postures keep all limits, at ${at}`,
+      `Goal ${NB.words(this.run.goal.name)}: ${count} of ${this.found.length} postures satisfy all limits at ${at}`,
       columns,
       this.found,
       { class: 'small full' },
@@ -738,14 +740,14 @@ class Explore {
       ? NB.el('p', {
           class: 'small',
           text:
-            'Here the goal stays where it is in the room. The scenario gives it from the robot\u2019s base ' +
-            '(flange_pose), so there it goes along with the base: give its target and entry in the room before you ' +
+            'On this page the goal is fixed in the room. The scenario defines it from the robot\u2019s base ' +
+            '(flange_pose), so there it moves with the base: define its target and entry in the room before you ' +
             'move the base.',
         })
       : null;
     // A button that has the focus keeps it.
     const focused = [...this.reached.querySelectorAll('button')].findIndex((each) => each.matches(':focus'));
-    NB.clear(this.reached, NB.el('h3', { text: 'What if the robot stood here?' }), table, note);
+    NB.clear(this.reached, NB.el('h3', { text: 'Configurations from this base' }), table, note);
     if (focused >= 0) this.reached.querySelectorAll('button')[focused]?.focus();
     this.reached.dataset.rolls = isLast ? 'all' : 'few';
   }
@@ -784,7 +786,7 @@ class Explore {
       range.selectNodeContents(this.text);
       getSelection()?.removeAllRanges();
       getSelection()?.addRange(range);
-      this.copied.textContent = 'selected: copy it with Ctrl+C';
+      this.copied.textContent = 'selected, copy with Ctrl+C';
     }
     clearTimeout(this.copiedUntil);
     this.copiedUntil = setTimeout(() => {
@@ -792,7 +794,7 @@ class Explore {
     }, 4000);
   }
 
-  /** The run's layers, less what is a result of the run. */
+  /** The run's layers, without the results of the run. */
   applyLayers() {
     if (!this.active) return;
     const { view, run } = this;
@@ -911,11 +913,11 @@ class Explore {
     }
   }
 
-  /** Layers that show what the run has found. */
+  /** Layers that show results of the run. */
   static RESULTS = ['arm', 'other', 'witness', 'ellipsoids', 'cone', 'sight', 'taken'];
   /**
-   * Rolls that are looked at when all rests, what a look at fewer may take while the base moves, and radius of the
-   * ring (m).
+   * Rolls that are checked when all rests, time limit of a check of fewer while the base moves (ms), and radius of
+   * the ring (m).
    */
   static ROLLS = 36;
   static COARSE_MS = 10;

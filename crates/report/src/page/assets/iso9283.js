@@ -1,4 +1,4 @@
-// The page of a run without goals: a test by ISO 9283, or a run that excites every joint.
+// The page of a run without goals: a test by ISO 9283, or an excitation run.
 'use strict';
 
 class TestPage {
@@ -33,11 +33,13 @@ class TestPage {
     this.view.frame(NB.aboutBase(this.page.scene.chain.base, 0.55), [-0.75, 0.45, -0.55]);
     app.append(
       this.view.element,
-      NB.el('p', { class: 'soft', text: 'The arm at its start.' }),
+      NB.el('p', { class: 'soft', text: 'Arm in its start posture.' }),
       NB.section(
-        'Run that excites every joint',
+        'Excitation run',
         true,
-        NB.el('p', { text: 'Proven clearances by motion are in report.json; the logs are in the files named here.' }),
+        NB.el('p', {
+          text: 'Certified clearances by motion are in report.json; the logs are in the files named here.',
+        }),
         NB.tree(this.report.excitation),
       ),
     );
@@ -59,10 +61,10 @@ class TestPage {
     app.append(
       NB.el('p', {
         text:
-          `The arm goes from P1 to P5 and back as ${protocol.configuration}, at ` +
+          `The arm moves from P1 to P5 and back as ${protocol.configuration}, at ` +
           `${NB.percent(protocol.speed_share)} % of its rated joint speeds, with ` +
-          `${NB.significant(protocol.load_kg)} kg at the flange. A tracker measures where it comes to rest; its ` +
-          `noise has a standard deviation of ${NB.length(protocol.tracker_noise_m)} on each axis.`,
+          `${NB.significant(protocol.load_kg)} kg at the flange. A tracker measures the attained positions; its ` +
+          `noise has a standard deviation of ${NB.length(protocol.tracker_noise_m)} per axis.`,
       }),
       NB.el(
         'div',
@@ -73,11 +75,11 @@ class TestPage {
           NB.el(
             'div',
             { class: 'bar no-print', role: 'group', 'aria-label': 'Pose' },
-            NB.el('span', { text: 'Arm at' }),
+            NB.el('span', { text: 'Pose' }),
             this.poseButtons,
             engines.length > 1
               ? NB.select(
-                  'Spread of',
+                  'Engine',
                   engines.map((name, at) => [String(at), name]),
                   '0',
                   (value) => {
@@ -94,7 +96,7 @@ class TestPage {
         NB.el('div', null, NB.el('div', { class: 'panel' }, this.results(), this.remarks())),
       ),
       NB.section(
-        'Where the arm came to rest',
+        'Attained positions',
         true,
         test.engines.map(({ engine, attained }) =>
           NB.chart(
@@ -102,12 +104,12 @@ class TestPage {
             attained,
             NB.fileName(this.report.scenario.name, 'attained', engine),
             'Positions in the controller\u2019s base frame, all poses to one scale. AP: distance of the mean ' +
-              'from the command; RP: mean distance from the mean and three standard deviations of it.',
+              'from the command; RP: mean distance from the mean plus three standard deviations.',
           ),
         ),
       ),
       NB.section(
-        'How it came to rest',
+        'Stabilisation',
         true,
         test.engines.map(({ engine, stabilisation }) =>
           NB.chart(
@@ -117,7 +119,7 @@ class TestPage {
           ),
         ),
       ),
-      NB.section('All of the test\u2019s numbers', true, this.tables()),
+      NB.section('All test results', true, this.tables()),
     );
     const spots = test.commanded;
     const middle = spots[0];
@@ -125,7 +127,7 @@ class TestPage {
       [...NB.aboutBase(this.page.scene.chain.base, 0.55), ...spots],
       NB.direction(this.page.scene.chain.base, middle, [0, 0, -1]),
     );
-    // The way of a cycle: P5 P4 P3 P2 P1.
+    // The path of a cycle: P5 P4 P3 P2 P1.
     spots.forEach((at, index) => {
       view.rod('needle', at, spots[(index + spots.length - 1) % spots.length], 0.0012, [0.35, 0.38, 0.42, 1], true);
       view.ball('needle', at, 0.006, [0.84, 0.37, 0, 1], true);
@@ -148,9 +150,9 @@ class TestPage {
     this.arm.pose(this.page.scene.chain, this.measured.protocol.joints_rad[index]);
     const attained = Object.values(this.measured.engines)[this.engine]?.poses[index];
     this.note.textContent =
-      `The arm stands in the commanded pose P${index + 1}. Blue points: where the measured point came to rest, ` +
-      `their distance from the command drawn ${this.spread.toLocaleString('en')} times larger than it ` +
-      `is${attained ? ` (AP ${NB.length(attained.ap_m)}, RP ${NB.length(attained.rp_m)})` : ''}.`;
+      `The arm is in the commanded pose P${index + 1}. Blue points: attained positions, deviations from the ` +
+      `command magnified ${this.spread.toLocaleString('en')} times` +
+      `${attained ? ` (AP ${NB.length(attained.ap_m)}, RP ${NB.length(attained.rp_m)})` : ''}.`;
     NB.address.write({ pose: String(index + 1) });
     this.view.draw();
   }
@@ -183,7 +185,7 @@ class TestPage {
       return known.length < all.length ? null : Math.max(...known);
     };
     return NB.table(
-      'The worst of all poses',
+      'Worst case over all poses',
       [
         { title: 'Engine', cell: ([engine]) => engine },
         {
@@ -194,21 +196,31 @@ class TestPage {
         },
         { title: 'Repeatability RP', numeric: true, cell: ([, each]) => NB.length(each.rp_m) },
         {
-          title: 'Direction vAP',
+          title: 'Multi-directional variation vAP',
           numeric: true,
           cell: ([, each]) => NB.length(each.vap_m),
-          help: 'how far the means lie apart that were approached from different directions',
+          help: 'distance between the means of approaches from different directions',
         },
-        { title: 'Settles in', unit: 's', numeric: true, cell: ([, each]) => NB.fixed(worst(each, 'time_s'), 3) },
+        {
+          title: 'Stabilisation time',
+          unit: 's',
+          numeric: true,
+          cell: ([, each]) => NB.fixed(worst(each, 'time_s'), 3),
+        },
         { title: 'Overshoot', numeric: true, cell: ([, each]) => NB.length(worst(each, 'overshoot_m')) },
-        { title: 'Torque of limit', unit: '%', numeric: true, cell: ([, each]) => NB.percent(each.peak_torque_ratio) },
+        {
+          title: 'Peak torque',
+          unit: '% of limit',
+          numeric: true,
+          cell: ([, each]) => NB.percent(each.peak_torque_ratio),
+        },
       ],
       rows,
       { class: 'small full' },
     );
   }
 
-  /** What has to be known to read the numbers, before anybody reads them. */
+  /** Remarks that qualify the numbers, before the numbers. */
   remarks() {
     const remarks = Object.entries(this.measured.engines).filter(([, each]) => each.remark);
     return [...new Set(remarks.map(([, each]) => each.remark))].map((remark) => {
@@ -227,7 +239,7 @@ class TestPage {
       }));
       return [
         NB.table(
-          `${engine}: by pose; ${each.cycles_simulated} cycles simulated, each pose read with the tracker's noise`,
+          `${engine}: by pose; ${each.cycles_simulated} cycles simulated, readings with tracker noise`,
           [
             { title: 'Pose', cell: ({ pose }) => `P${pose.pose}` },
             { title: 'Measured', numeric: true, cell: ({ pose }) => `${pose.count} readings` },
@@ -239,9 +251,14 @@ class TestPage {
             })),
             { title: 'RP', numeric: true, cell: ({ pose }) => NB.length(pose.rp_m) },
             { title: 'vAP', numeric: true, cell: ({ direction }) => NB.length(direction?.vap_m) },
-            { title: 'Settles in', unit: 's', numeric: true, cell: ({ settled }) => NB.fixed(settled?.time_s, 3) },
             {
-              title: 'after the motion',
+              title: 'Stabilisation time',
+              unit: 's',
+              numeric: true,
+              cell: ({ settled }) => NB.fixed(settled?.time_s, 3),
+            },
+            {
+              title: 'After motion end',
               unit: 's',
               numeric: true,
               cell: ({ settled }) => NB.fixed(settled?.after_motion_s, 3),

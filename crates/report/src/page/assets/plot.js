@@ -248,7 +248,7 @@ class Curves {
         );
         return button;
       }),
-      NB.checkbox('whole range', this.whole, (on) => {
+      NB.checkbox('full range', this.whole, (on) => {
         this.whole = on;
         this.draw();
       }),

@@ -106,7 +106,7 @@ class RunPage {
 
   head() {
     const { verdict, engine_failures: failures } = this.report;
-    return NB.el(
+    const bar = NB.el(
       'div',
       { class: 'bar' },
       NB.verdict(verdict),
@@ -119,6 +119,9 @@ class RunPage {
         }),
       ),
     );
+    // What the verdict rests on stands beside it.
+    const notes = this.page.qualifying.map((text) => NB.el('li', { text: `note: ${text}` }));
+    return NB.el('div', null, bar, notes.length ? NB.el('ul', { class: 'plain' }, notes) : null);
   }
 
   /** @param {HTMLElement} app */
@@ -162,7 +165,7 @@ class RunPage {
     this.now = NB.el('div', { class: 'now small', role: 'status', 'aria-live': 'off' });
     this.curves = new Curves({
       height: 250,
-      label: 'Clearance of each class over the time of the motion',
+      label: 'Clearance by class over time',
       xTitle: 'time (s)',
       yTitle: 'clearance (mm)',
       seek: (time) => {
@@ -171,7 +174,7 @@ class RunPage {
       },
     });
     const hasEvents = goals.some((goal) => goal.configurations.some((each) => each.events));
-    this.budgetSection = NB.section('How far off the needle will be: error budget', true, this.budget);
+    this.budgetSection = NB.section('Tip error budget', true, this.budget);
     app.append(
       this.goalTable?.element || '',
       NB.el(
@@ -206,11 +209,11 @@ class RunPage {
         ),
         NB.el('div', null, this.side, this.details, this.layerPanel()),
       ),
-      NB.section('Configurations compared', true, this.table),
+      NB.section('Comparison of configurations', true, this.table),
       this.budgetSection,
-      hasEvents ? NB.section('Contact, emergency stop and way back', true, this.events) : '',
-      NB.section('Clearance kept by the planned motion', false, this.margins),
-      NB.section('People and free space', false, this.people),
+      hasEvents ? NB.section('Contact, emergency stop, retreat', true, this.events) : '',
+      NB.section('Clearance of the planned motion', false, this.margins),
+      NB.section('Free space and line of sight', false, this.people),
     );
     this.setGoal(0);
   }
@@ -253,10 +256,10 @@ class RunPage {
         const d = this.direction(this.goal.target_m, this.goal.axis);
         return { direction: d, distance: 0.55, middle: entry() };
       }),
-      NB.pngButton(this.view, 'The view', () => this.fileName(`${this.time.toFixed(2)}s`)),
+      NB.pngButton(this.view, '3D view', () => this.fileName(`${this.time.toFixed(2)}s`)),
       NB.el('span', {
         class: 'soft small',
-        text: 'drag: turn \u00b7 wheel or two fingers: zoom \u00b7 right button: move',
+        text: 'drag: rotate \u00b7 wheel or pinch: zoom \u00b7 right button: pan',
       }),
     );
   }
@@ -289,7 +292,7 @@ class RunPage {
       ['vessel', 'vessels'],
       ['lesion', 'lesions'],
       ['marker', 'markers'],
-      ['corridor', 'needle corridor'],
+      ['corridor', 'access zone'],
     ].filter(([name]) => present.has(name));
     const hasBudget = this.report.goals.some((goal) => goal.configurations.some((each) => each.budget));
     return NB.el(
@@ -300,11 +303,11 @@ class RunPage {
         'div',
         { role: 'group', 'aria-label': 'Parts of the picture' },
         parts.map(([name, text]) => box(name, text)),
-        box('needle', 'needle line'),
-        box('cone', 'cone for the hand'),
-        box('people', 'people and sight'),
+        box('needle', 'needle axis'),
+        box('cone', 'hand cone'),
+        box('people', 'people and line of sight'),
         box('space', 'free space'),
-        box('witness', 'what is nearest'),
+        box('witness', 'closest pair'),
         hasBudget ? box('ellipsoids', 'error ellipsoids') : null,
       ),
       NB.el(
@@ -312,7 +315,7 @@ class RunPage {
         { class: 'bar' },
         hasBudget
           ? NB.select(
-              'Error ellipsoids drawn at',
+              'Error ellipsoid scale',
               [
                 ['1', 'true size'],
                 ['5', '5 \u00d7'],
@@ -342,7 +345,7 @@ class RunPage {
       max: '1',
       step: '0.01',
       value: '0',
-      'aria-label': 'Time of the motion',
+      'aria-label': 'Motion time',
       oninput: (event) => {
         this.pause();
         this.seek(Number(event.target.value));
@@ -464,7 +467,7 @@ class RunPage {
     this.apart.textContent =
       apart_m === undefined
         ? ''
-        : `The engines\u2019 tips are at most ${NB.length(apart_m)} apart; the second is seen only where they differ.`;
+        : `Largest tip difference between engines: ${NB.length(apart_m)}. The second is seen only where they differ.`;
     this.showDetails();
     this.showSections();
     this.drawRoom();
@@ -473,7 +476,7 @@ class RunPage {
     this.drawGhosts();
   }
 
-  /** What the sections below say of this configuration. */
+  /** The sections below, for this configuration. */
   showSections() {
     const { goal, configuration } = this;
     const { charts } = this.own;
@@ -482,7 +485,7 @@ class RunPage {
     this.budgetSection.hidden = !budget;
     NB.clear(this.budget, budget || []);
     NB.clear(this.margins, NB.sections.margins(configuration));
-    NB.clear(this.events, NB.sections.events(goal, configuration, charts, name) || []);
+    NB.clear(this.events, NB.sections.events(this.page, goal, configuration, charts) || []);
   }
 
   /** @param {MotionRun} run @returns {DecodedRun} */
@@ -638,7 +641,7 @@ class RunPage {
   }
 
   /**
-   * What is nearest at a time of the motion that is shown, or in the final posture; null where nothing is known.
+   * The closest pair at a time of the motion that is shown, or in the final posture; null where none is known.
    * @param {number} time
    * @returns {Nearest | null}
    */
@@ -675,18 +678,15 @@ class RunPage {
   }
 
   /**
-   * The least clearance over the whole motion of arm and tool from what stands around them.
+   * The clearance over the whole motion: the least distance of arm and tool from the surroundings.
    * @param {ConfigurationReport} configuration
    * @returns {Nearest | null}
    */
   leastOf(configuration) {
-    const all = NB.byClass(configuration.clearance).filter(([name]) => this.page.classesAround.includes(name));
-    if (!all.length) return null;
-    const [name, found] = all.reduce((best, each) => (each[1].minimum_m < best[1].minimum_m ? each : best));
-    return { name, ...found };
+    return NB.leastAround(this.page, configuration.clearance);
   }
 
-  /** What is nearest at the time that is shown; a row of the table pins the least of its class, at its time. */
+  /** The closest pair at the time that is shown; a row of the table pins the minimum of its class, at its time. */
   drawWitness() {
     const view = this.view;
     view.empty('witness');
@@ -702,7 +702,7 @@ class RunPage {
       view.rod('witness', a, b, 0.002, rgba, true);
       for (const end of [a, b]) view.ball('witness', end, 0.005, rgba, true);
       const when = !this.shown.length || found.time_s === null ? '' : ` at ${found.time_s.toFixed(2)} s`;
-      const what = this.pinned ? `least ${NB.words(found.name)}` : pairWords(found);
+      const what = this.pinned ? `minimum, ${NB.words(found.name)}` : pairWords(found);
       view.label(
         'witness',
         `${what}: ${NB.mm(found.minimum_m)} mm${when}`,
@@ -720,7 +720,7 @@ class RunPage {
       found &&
       NB.el('p', {
         text:
-          `Nearest ${this.shown.length ? `now, at ${this.time.toFixed(2)} s` : 'in the final posture'}: ` +
+          `Closest pair ${this.shown.length ? `at ${this.time.toFixed(2)} s` : 'in the final posture'}: ` +
           `${pairWords(found)}, ${NB.mm(found.minimum_m)} mm.`,
       });
     const all =
@@ -729,7 +729,7 @@ class RunPage {
       NB.el(
         'p',
         null,
-        `Least over the whole motion: ${pairWords(least)}, ${NB.mm(least.minimum_m)} ` +
+        `Clearance over the whole motion: ${pairWords(least)}, ${NB.mm(least.minimum_m)} ` +
           `mm${least.time_s === null ? '. ' : ` at ${least.time_s.toFixed(2)} s. `}`,
         least.time_s === null
           ? null
@@ -747,7 +747,7 @@ class RunPage {
             ),
       );
     const own = this.configuration.clearance.self;
-    if (all && own) all.append(`Of the arm from itself, by its build: ${pairWords(own)}, ${NB.mm(own.minimum_m)} mm. `);
+    if (all && own) all.append(`Self-clearance (inherent): ${pairWords(own)}, ${NB.mm(own.minimum_m)} mm. `);
     if (this.playing && this.now.firstChild && now) {
       // The button stays where it is.
       this.now.firstChild.replaceWith(now);
@@ -770,7 +770,7 @@ class RunPage {
     }
   }
 
-  /** What the configuration leaves: lines of sight, taken space, cone. */
+  /** Lines of sight, occupied space and hand cone of the configuration. */
   drawRoom() {
     const view = this.view;
     view.empty('taken');
@@ -815,7 +815,7 @@ class RunPage {
         view.ellipsoid('ellipsoids', center, columns, color);
         view.label(
           'ellipsoids',
-          `${this.magnify === 1 ? '' : `\u00d7 ${this.magnify}: `}95 % at ${where}, longest half axis ` +
+          `${this.magnify === 1 ? '' : `\u00d7 ${this.magnify}: `}95 % at ${where}, longest semi-axis ` +
             `${NB.mm(2.7955 * NB.longest(moments.covariance_m2), 1)} mm`,
           center,
         );
@@ -828,7 +828,7 @@ class RunPage {
   status(configuration) {
     const recommended = this.goal.recommended?.label === configuration.label;
     const words = {
-      ok: ['good', '\u2713 works'],
+      ok: ['good', '\u2713 feasible'],
       failed: ['bad', '\u2717 failed'],
       rejected: ['off', '\u2013 rejected'],
     };
@@ -864,7 +864,7 @@ class RunPage {
       { title: 'Configuration', cell: (c) => c.label },
       {
         title: 'Ghost',
-        help: 'show its posture, too',
+        help: 'also show this posture',
         cell: (c) =>
           NB.el(
             'span',
@@ -906,7 +906,7 @@ class RunPage {
           this.drawGhosts();
         },
       },
-      this.ghosts.size ? 'No ghosts' : 'All as ghosts',
+      this.ghosts.size ? 'Hide all ghosts' : 'Show all ghosts',
     );
     NB.clear(this.side, table, all);
   }
@@ -924,22 +924,22 @@ class RunPage {
     const reasons = c.rejections.map((each) => item(`Rejected, ${NB.words(each.rule)}`, each));
     const failed = this.report.criteria
       .filter((each) => !each.pass && each.goal === this.goal.name && each.label === c.label)
-      .map((each) => item(`Misses ${NB.criterionWords(each.criterion)}`, each));
+      .map((each) => item(`Failed, ${NB.criterionWords(each.criterion)}`, each));
     const classes = NB.byClass(c.clearance);
     /** @type {Column<[name: string, found: ClassMinimum]>[]} */
     const columns = [
-      { title: 'Between', cell: ([name]) => [NB.sample(NB.styleOf(name)), ` ${NB.words(name)}`] },
-      { title: 'Least', unit: 'mm', numeric: true, cell: ([, found]) => NB.mm(found.minimum_m) },
+      { title: 'Class', cell: ([name]) => [NB.sample(NB.styleOf(name)), ` ${NB.words(name)}`] },
+      { title: 'Minimum', unit: 'mm', numeric: true, cell: ([, found]) => NB.mm(found.minimum_m) },
       {
-        title: 'Which and when',
+        title: 'Pair and time',
         cell: ([, found]) =>
           `${[...new Set(found.pair.map(NB.words))].join(' to ')}, ` +
           `${NB.words(found.phase)}${found.time_s === null ? '' : ` ${found.time_s.toFixed(2)} s`}`,
       },
     ];
     const caption = this.own.runs.length
-      ? 'Least clearances over the whole motion; a row shows where and when'
-      : 'Clearances of the final posture; a row shows where';
+      ? 'Minimum by class over the whole motion; a row shows where and when'
+      : 'Minimum by class in the final posture; a row shows where';
     const table = NB.table(caption, columns, classes, { class: 'choose small full' });
     const rows = NB.tableRows(table);
     NB.rows(rows, (index) => {
@@ -976,20 +976,20 @@ class RunPage {
       { title: 'Rank', numeric: true, cell: (c) => (c.ranking ? String(c.ranking.rank) : '\u2013') },
       {
         title: 'Pareto set',
-        cell: (c) => (c.pareto ? 'yes' : c.dominated_by ? `no: ${c.dominated_by.label} is better` : ''),
-        help: 'in it: no other that works is as good in everything and better in something',
+        cell: (c) => (c.pareto ? 'yes' : c.dominated_by ? `no: dominated by ${c.dominated_by.label}` : ''),
+        help: 'yes: no other feasible configuration is as good in everything and better in something',
       },
-      { title: 'Score of 100', numeric: true, cell: (c) => NB.fixed(c.ranking && 100 * c.ranking.score, 1) },
+      { title: 'Score', unit: 'of 100', numeric: true, cell: (c) => NB.fixed(c.ranking && 100 * c.ranking.score, 1) },
       {
-        title: 'First reason against',
+        title: 'First rejection',
         text: true,
         cell: (c) => (c.rejections[0] ? `${NB.words(c.rejections[0].rule)}: ${c.rejections[0].detail}` : ''),
       },
       ...NB.metricColumns(this.extra.columns.table),
     ];
     const table = NB.table(
-      `${NB.words(this.goal.name)}: clearances are the least over the recorded motions of all engines; those ` +
-        'that are proven hold between the samples, too',
+      `${NB.words(this.goal.name)}: clearances are minima over the recorded motions of all engines; certified ones ` +
+        'also hold between samples',
       columns,
       this.goal.configurations,
       { class: 'choose small' },
@@ -1004,7 +1004,7 @@ class RunPage {
         ? NB.el(
             'details',
             { class: 'no-print' },
-            NB.el('summary', { text: 'What the scores are made of' }),
+            NB.el('summary', { text: 'Score breakdown' }),
             NB.chart(
               `${NB.words(this.goal.name)}: ranking`,
               ranking,

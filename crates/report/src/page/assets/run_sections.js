@@ -35,6 +35,24 @@ NB.byClass = (clearances) => {
   return /** @type {[string, ClassMinimum][]} */ (all.filter(([, found]) => found?.witness_points_m));
 };
 
+/** The classes of arm and tool against their surroundings, self-clearance left out. */
+NB.around = (page, clearances) => NB.byClass(clearances).filter(([name]) => page.classesAround.includes(name));
+
+/** The clearance, as in the terminal's column of that name: the least distance from the surroundings. */
+NB.leastAround = (page, clearances) => {
+  const all = NB.around(page, clearances);
+  if (!all.length) return null;
+  const [name, found] = all.reduce((best, each) => (each[1].minimum_m < best[1].minimum_m ? each : best));
+  return { name, ...found };
+};
+
+/** Its certified lower bound; null unless every class has one. */
+NB.certifiedAround = (page, clearances) => {
+  const bounds = NB.around(page, clearances).flatMap(([, found]) => found.certified_lower_bound_m ?? -Infinity);
+  const least = Math.min(...bounds);
+  return Number.isFinite(least) ? least : null;
+};
+
 NB.sections = /** @type {RunSections} */ (
   /** @type {Partial<RunSections>} */ ({
     /** What to choose, and why, before all else. */
@@ -49,32 +67,32 @@ NB.sections = /** @type {RunSections} */ (
               recommended.reason.charAt(0).toUpperCase() + recommended.reason.slice(1),
               '.',
             )
-          : NB.el('p', { class: 'error', text: 'Recommended: none, no configuration works.' }),
+          : NB.el('p', { class: 'error', text: 'Recommended: none, no configuration is feasible.' }),
         NB.sections.route(goal, criteria),
         trueTarget ? NB.el('p', { text: `${trueTarget.charAt(0).toUpperCase()}${trueTarget.slice(1)}.` }) : [],
       ];
     },
 
-    /** How the planned needle keeps away from bone, vessels and organs; red where it does not. */
+    /** Clearance of the planned needle path from bone, vessels and organs; red where it is rejected. */
     route(goal, criteria) {
       const { needle_route: route, fissures_crossed: fissures } = goal;
       const parts = [];
       if (route) {
-        // The criterion where it asks for more than the margin.
-        const wanted =
+        // The criterion where it is stricter than the margin.
+        const required =
           criteria.find((each) => each.goal === goal.name && each.criterion === 'min_clearance_mm.needle_route')
             ?.limit ?? 0;
         const part = `${NB.words(route.part)} (${route.tissue})`;
         const where =
           route.distance_m < 0
-            ? `goes ${NB.mm(-route.distance_m, 1)} mm deep through the ${part}`
-            : `passes ${NB.mm(route.distance_m, 1)} mm from the ${part}`;
+            ? `penetration ${NB.mm(-route.distance_m, 1)} mm into ${part}, clearance`
+            : `clearance ${NB.mm(route.distance_m, 1)} mm to ${part},`;
         parts.push(
           NB.el('p', {
             class: route.kept ? '' : 'error',
             text:
-              `The planned needle${route.kept ? '' : ' is refused: it'} ${where}; it has to keep ` +
-              `${NB.mm(Math.max(route.margin_m, wanted), 1)} mm.`,
+              `Needle path${route.kept ? '' : ' rejected'}: ${where} ` +
+              `${NB.mm(Math.max(route.margin_m, required), 1)} mm required.`,
           }),
         );
       }
@@ -91,29 +109,42 @@ NB.sections = /** @type {RunSections} */ (
       if (goals.length < 2) return null;
       /** @param {GoalReport} goal */
       const chosen = (goal) => goal.configurations.find((each) => each.label === goal.recommended?.label);
+      /** @param {GoalReport} goal */
+      const least = (goal) => {
+        const found = chosen(goal);
+        return found && NB.leastAround(page.page, found.clearance);
+      };
       const table = NB.table(
-        'All goals, each with its recommended configuration',
+        'All goals with their recommended configurations',
         [
           { title: 'Goal', cell: (goal) => NB.words(goal.name) },
-          { title: 'Recommended', cell: (goal) => goal.recommended?.label || 'none works' },
+          { title: 'Recommended', cell: (goal) => goal.recommended?.label || 'none' },
           {
-            title: 'Work',
+            title: 'Feasible',
             cell: (goal) =>
               `${goal.configurations.filter((each) => each.status === 'ok').length} of ${goal.configurations.length}`,
           },
           {
-            title: 'Expected tip error, rms',
+            title: 'RMS tip error',
             numeric: true,
             cell: (goal) => NB.length(chosen(goal)?.budget?.total.at_target.analytic.rms_m),
           },
           {
-            title: 'Least clearance',
+            title: 'Clearance',
             unit: 'mm',
             numeric: true,
-            cell: (goal) => NB.mm(chosen(goal)?.clearance.minimum_m),
+            cell: (goal) => NB.mm(least(goal)?.minimum_m),
+            help: 'minimum distance of arm and tool from the surroundings',
           },
           {
-            title: 'Needle to the nearest part',
+            title: 'Self-clearance',
+            unit: 'mm',
+            numeric: true,
+            cell: (goal) => NB.mm(chosen(goal)?.clearance.self?.minimum_m),
+            help: 'minimum distance of arm and tool from themselves',
+          },
+          {
+            title: 'Needle path clearance',
             unit: 'mm',
             numeric: true,
             cell: (goal) => NB.mm(goal.needle_route?.distance_m),
@@ -127,54 +158,60 @@ NB.sections = /** @type {RunSections} */ (
       return { element: table, rows };
     },
 
-    /** What the planned motion keeps of the clearance that its postures allow, and the way back. */
+    /** Achieved and attainable clearance of the planned motion and of the retreat. */
     margins(c) {
       if (!c.margin) return NB.el('p', { class: 'soft', text: `${c.label} has no planned motion.` });
       /** @param {string} name */
       const retreat = (name) => c.retreat_clearance[name]?.certified_lower_bound_m ?? null;
       /** @type {Column<[name: string, margin: Margin['classes'][string]]>[]} */
       const columns = [
-        { title: 'Between', cell: ([name]) => NB.words(name) },
+        { title: 'Class', cell: ([name]) => NB.words(name) },
         {
-          title: 'Has to be',
+          title: 'Required',
           unit: 'mm',
           numeric: true,
           cell: ([, each]) => NB.mm(each.limit_m),
-          help: 'the limit of the scenario\u2019s criteria, else of its planning',
+          help: 'limit of the scenario\u2019s criterion, otherwise of its planning',
         },
         {
-          title: 'At most possible',
+          title: 'Attainable',
           unit: 'mm',
           numeric: true,
           cell: ([, each]) => NB.mm(each.attainable_m),
-          help: 'least of the start, the approach and its end, which every motion takes',
+          help: 'minimum over the start, the approach and its end, which every motion includes',
         },
-        { title: 'Kept on the way in', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.achieved_m) },
-        { title: 'Nearest in the', cell: ([, each]) => NB.words(each.limited_by) },
         {
-          title: 'Kept on the way back',
+          title: 'Achieved',
+          unit: 'mm',
+          numeric: true,
+          cell: ([, each]) => NB.mm(each.achieved_m),
+          help: 'minimum over the whole motion from the start to the goal',
+        },
+        { title: 'Limiting phase', cell: ([, each]) => NB.words(each.limited_by) },
+        {
+          title: 'Achieved, retreat',
           unit: 'mm',
           numeric: true,
           cell: ([name]) => (retreat(name) === null ? '\u2013' : NB.mm(retreat(name))),
         },
       ];
       const ends = {
-        bound: 'no other way keeps more that counts',
-        proof: 'no other way helps: a posture that every motion takes is too near',
-        budget: 'the search ended by its budget: a better way may exist',
+        bound: 'optimal within tolerance',
+        proof: 'start, approach or final posture too close, no alternative path helps',
+        budget: '`motion_checks` exhausted, a better path may exist',
       };
       return [
         NB.table(`${c.label}: ${ends[c.margin.search]}`, columns, Object.entries(c.margin.classes), { class: 'small' }),
         NB.el('p', {
           class: 'soft small',
           text:
-            'Proven lower bounds of the planned motion of the nominal arm: nothing comes nearer than this. ' +
-            'Clearances of recorded motions, in the other tables, are what was attained, and a little more.',
+            'Certified lower bounds of the planned motion of the nominal arm. ' +
+            'Clearances in the other tables are measured on recorded motions and are slightly larger.',
         }),
       ];
     },
 
-    /** Where the needle goes over all arms and patients, in all and by source. */
+    /** Tip error over the arm and patient population, in total and by source. */
     budget(goal, configuration, charts, name) {
       const with_ = goal.configurations.filter((c) => c.budget || c.budget_failure);
       if (!with_.length) return null;
@@ -184,43 +221,45 @@ NB.sections = /** @type {RunSections} */ (
       /** @type {Column<ConfigurationReport>[]} */
       const columns = [
         { title: 'Configuration', cell: (c) => c.label },
-        { title: 'All', unit: 'mm', numeric: true, cell: (c) => rms(c.budget?.total) },
+        { title: 'All sources, RMS', unit: 'mm', numeric: true, cell: (c) => rms(c.budget?.total) },
         {
-          title: '95 % within',
+          title: 'P95',
           unit: 'mm',
           numeric: true,
           cell: (c) => NB.mm(c.budget?.total.at_target.radius_95_m, 2),
-          help: 'distance that 95 % of all arms and patients stay within',
+          help: '95th percentile over the arm and patient population',
         },
         {
-          title: 'At the skin',
+          title: 'At the skin, RMS',
           unit: 'mm',
           numeric: true,
           cell: (c) => NB.mm(c.budget?.total.at_skin?.analytic.rms_m, 2),
         },
-        { title: 'Mostly by', cell: (c) => (c.budget ? NB.words(c.budget.dominant ?? '\u2013') : c.budget_failure) },
+        {
+          title: 'Dominant source',
+          cell: (c) => (c.budget ? NB.words(c.budget.dominant ?? '\u2013') : c.budget_failure),
+        },
         ...sources.map((source) => ({
-          title: `By ${NB.words(source)}${NB.words(source).includes(',') ? ',' : ''} alone`,
+          title: `Only ${NB.words(source)}`,
           unit: 'mm',
           numeric: true,
           cell: (/** @type {ConfigurationReport} */ c) => rms(c.budget?.sources.find((each) => each.source === source)),
         })),
       ];
       const help =
-        'Ellipses hold 95 %. x and y are across the needle, z along it; both panels are in mm and to one scale, ' +
-        'the same for all configurations of the goal. The bar: each source\u2019s share of the mean square.';
+        'Ellipses contain 95 %. x and y are lateral, z is depth; both panels are in mm and have one scale, ' +
+        'the same for all configurations of the goal. Bar: share of each source in the mean square error.';
       return [
         charts?.budget
           ? NB.chart(
-              `${configuration.label}: where the needle goes`,
+              `${configuration.label}: tip error distribution`,
               charts.budget,
               NB.fileName(name, goal.name, configuration.label, 'budget'),
               help,
             )
           : null,
         NB.table(
-          'Expected distance of the tip from the target, root mean square over all arms and patients: by all ' +
-            'sources together, and by each alone',
+          'RMS tip error over the arm and patient population: all sources combined, and each source alone',
           columns,
           with_,
           { class: 'small' },
@@ -237,7 +276,7 @@ NB.sections = /** @type {RunSections} */ (
       /** @type {Column<WithRoom>[]} */
       const columns = [
         { title: 'Configuration', cell: (c) => c.label },
-        { title: 'Free in all', unit: '%', numeric: true, cell: (c) => NB.percent(c.room.free_fraction) },
+        { title: 'Free space', unit: '%', numeric: true, cell: (c) => NB.percent(c.room.free_fraction) },
         ...regions.map((name) => ({
           title: `Free ${NB.regionWords[name] || NB.words(name)}`,
           unit: '%',
@@ -245,19 +284,22 @@ NB.sections = /** @type {RunSections} */ (
           cell: (/** @type {WithRoom} */ c) => NB.percent(c.room.regions[name]),
         })),
         ...sight.map((name) => ({
-          title: `Seen by ${name}`,
+          title: `Line of sight, ${name}`,
           unit: '%',
           numeric: true,
           cell: (/** @type {WithRoom} */ c) => NB.percent(c.room.sight.find((each) => who(each) === name)?.fraction),
         })),
         {
-          title: 'Cone for the hand',
+          title: 'Hand cone',
           unit: '\u00b0',
           numeric: true,
           cell: (c) => NB.deg(c.room.hand_cone_half_angle_rad),
           help: 'half-angle of the largest free cone behind the guide',
         },
-        { title: 'It ends at', cell: (c) => (c.room.hand_cone_blocker ? NB.words(c.room.hand_cone_blocker) : '') },
+        {
+          title: 'Hand cone limited by',
+          cell: (c) => (c.room.hand_cone_blocker ? NB.words(c.room.hand_cone_blocker) : ''),
+        },
         { title: 'Elbow', cell: (c) => (c.room.elbow_up ? 'up' : 'down') },
         { title: 'Elbow above the entry', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.room.elbow_over_entry_m, 0) },
       ];
@@ -265,22 +307,22 @@ NB.sections = /** @type {RunSections} */ (
         NB.el('p', {
           class: 'soft no-print',
           text:
-            'Switch on "people and sight", "free space" and "cone for the hand" to see them: blue lines of sight are ' +
-            'free, orange ones end where they are blocked; orange cubes are taken by the arm.',
+            'Switch on "people and line of sight", "free space" and "hand cone" to see them. Blue lines of sight are ' +
+            'free; orange ones end where they are blocked. Orange cubes are occupied by the arm.',
         }),
         with_.length
           ? NB.table(
-              'Final posture: share of the half ball about the entry point that the arm leaves free, and of the ' +
-                'lines from eyes to entry and needle',
+              'Final posture: free share of the hemisphere about the entry point, and unobstructed share of the ' +
+                'lines of sight to entry and needle',
               columns,
               with_,
               { class: 'small' },
             )
-          : NB.el('p', { class: 'soft', text: 'Of no configuration is there a posture.' }),
+          : NB.el('p', { class: 'soft', text: 'No configuration has a posture.' }),
       ];
     },
 
-    /** What was checked: what was missed first and in full, what was met by criterion, and all of it folded. */
+    /** Evaluated criteria: failed ones first and in full, then a summary by criterion, and all of them folded. */
     criteria({ report, counts, missedAsExpected }) {
       const { criteria, not_judged: open } = report;
       const isExpected = new Set(missedAsExpected.map((index) => criteria[index]));
@@ -304,25 +346,25 @@ NB.sections = /** @type {RunSections} */ (
           cell: (c) =>
             NB.el('span', {
               class: c.pass ? 'good' : 'bad',
-              text: c.pass ? '\u2713 met' : isExpected.has(c) ? '\u2717 missed, as expected' : '\u2717 missed',
+              text: c.pass ? '\u2713 met' : isExpected.has(c) ? '\u2717 failed, as expected' : '\u2717 failed',
             }),
         },
         { title: 'Remark', text: true, cell: (c) => c.detail },
       ];
       /** @type {Column<NotJudged>[]} */
-      const unjudged = [...what, { title: 'Why it was not judged', text: true, cell: (c) => c.reason }];
+      const unjudged = [...what, { title: 'Reason', text: true, cell: (c) => c.reason }];
       return NB.section(
-        `What was checked: ${counts}`,
+        `Evaluation: ${counts}`,
         open.length > 0 || missed.length > 0,
-        missed.length ? NB.table('Missed', columns, missed, { class: 'small' }) : null,
-        open.length ? NB.table('What was to be judged and was not', unjudged, open, { class: 'small' }) : null,
+        missed.length ? NB.table('Failed criteria', columns, missed, { class: 'small' }) : null,
+        open.length ? NB.table('Not evaluated', unjudged, open, { class: 'small' }) : null,
         NB.sections.summary(criteria),
         NB.el(
           'details',
           { class: 'no-print' },
-          NB.el('summary', { text: `All ${criteria.length} one by one` }),
+          NB.el('summary', { text: `All ${criteria.length} results` }),
           NB.table(
-            'Everything that was judged, missed ones first',
+            'All evaluated criteria, failed ones first',
             columns,
             [...missed, ...criteria.filter((each) => each.pass)],
             { class: 'small' },
@@ -331,7 +373,7 @@ NB.sections = /** @type {RunSections} */ (
       );
     },
 
-    /** A row per criterion: how often it was met, and the one that came nearest to its limit. */
+    /** A row per criterion: how often it was met, and the value closest to its limit. */
     summary(criteria) {
       /** @type {Map<string, CriterionResult[]>} */
       const groups = new Map();
@@ -352,7 +394,7 @@ NB.sections = /** @type {RunSections} */ (
       /** @param {CriterionResult} c */
       const limits = (c) => (c.value === null ? ['', ''] : NB.valueAndLimit(c.value, c.limit, c.unit));
       return NB.table(
-        'By criterion, with the value that comes nearest to its limit',
+        'By criterion, with the value closest to its limit',
         [
           { title: 'Criterion', cell: (row) => NB.criterionWords(row.name) },
           {
@@ -364,7 +406,7 @@ NB.sections = /** @type {RunSections} */ (
                 text: `${row.met} of ${row.all.length}`,
               }),
           },
-          { title: 'Nearest value', numeric: true, cell: (row) => limits(row.nearest)[0] },
+          { title: 'Closest value', numeric: true, cell: (row) => limits(row.nearest)[0] },
           { title: 'Limit', numeric: true, cell: (row) => limits(row.nearest)[1] },
           {
             title: 'Where',
@@ -386,7 +428,7 @@ NB.sections = /** @type {RunSections} */ (
       const rows = report.trace || [];
       if (!rows.length) return null;
       /** @type {{ [outcome: string]: string }} */
-      const words = { met: '\u2713 met', missed: '\u2717 missed', not_judged: 'not judged' };
+      const words = { met: '\u2713 met', missed: '\u2717 failed', not_judged: 'not evaluated' };
       /** @type {Column<RequirementTrace>[]} */
       const columns = [
         { title: 'Requirement', cell: (r) => r.requirement },
@@ -396,13 +438,13 @@ NB.sections = /** @type {RunSections} */ (
           cell: (r) => NB.el('span', { class: r.outcome === 'met' ? 'good' : 'bad', text: words[r.outcome] }),
         },
         { title: 'Met', numeric: true, cell: (r) => String(r.met) },
-        { title: 'Missed', numeric: true, cell: (r) => String(r.missed) },
-        { title: 'Not judged', numeric: true, cell: (r) => String(r.not_judged) },
+        { title: 'Failed', numeric: true, cell: (r) => String(r.missed) },
+        { title: 'Not evaluated', numeric: true, cell: (r) => String(r.not_judged) },
       ];
       return NB.section(
         `Requirements (${rows.length})`,
         true,
-        NB.table('Requirements, the criteria that stand for them, and how often these were met', columns, rows, {
+        NB.table('Requirements, their criteria, and how often each was met', columns, rows, {
           class: 'small',
         }),
       );
@@ -428,30 +470,30 @@ NB.sections = /** @type {RunSections} */ (
           ? NB.el(
               'details',
               { class: 'section no-print' },
-              NB.el('summary', null, NB.el('h2', { text: 'The arm and the patient that were drawn' })),
+              NB.el('summary', null, NB.el('h2', { text: 'Sampled arm and patient (ground truth)' })),
               NB.el('p', {
                 class: 'soft',
                 text:
-                  'One draw of the scenario\u2019s imperfections, by its seed; lengths in m, angles in rad. The ' +
-                  'expected tip error is over all draws, not of this one.',
+                  'One draw of the scenario\u2019s imperfections with its seed; lengths in m, angles in rad. The ' +
+                  'RMS tip error is over the whole population, not for this draw.',
               }),
               NB.tree(truth),
             )
           : null,
-        NB.section('Where the numbers come from', false, NB.provenance(provenance, scenario.file)),
+        NB.section('Provenance', false, NB.provenance(provenance, scenario.file)),
       );
     },
   })
 );
 
-/** Contacts, stop and way back of a goal's configurations; null where the scenario asks for none. */
-NB.sections.events = (goal, configuration, charts, name) => {
+/** Contacts, stop and retreat of a goal's configurations; null where the scenario has none. */
+NB.sections.events = (page, goal, configuration, charts) => {
   const with_ = /** @type {WithEvents[]} */ (goal.configurations.filter((c) => c.events));
   if (!with_.length) return null;
   return [
-    ...NB.sections.press(with_, configuration, charts, goal, name),
-    ...NB.sections.stop(with_),
-    ...NB.sections.retract(with_),
+    ...NB.sections.press(with_, configuration, charts, goal, page.report.scenario.name),
+    ...NB.sections.stop(page, with_),
+    ...NB.sections.retract(page, with_),
   ];
 };
 
@@ -480,9 +522,9 @@ NB.sections.press = (with_, configuration, charts, goal, name) => {
     },
     { title: 'Engine', cell: ({ engine, press }) => engine || `not staged: ${press.not_staged}` },
     { title: 'Friction', numeric: true, cell: ({ press }) => NB.significant(press.friction) },
-    { title: 'Begins', unit: 's', numeric: true, cell: ({ measured }) => or(measured?.episodes[0]?.start_s, fixed(3)) },
+    { title: 'Start', unit: 's', numeric: true, cell: ({ measured }) => or(measured?.episodes[0]?.start_s, fixed(3)) },
     {
-      title: 'Speed then',
+      title: 'Approach speed',
       unit: 'mm/s',
       numeric: true,
       cell: ({ measured }) => or(measured?.episodes[0]?.approach_speed_m_s, (speed) => NB.fixed(speed * 1e3, 1)),
@@ -493,14 +535,14 @@ NB.sections.press = (with_, configuration, charts, goal, name) => {
       numeric: true,
       cell: ({ measured }) =>
         measured ? NB.fixed(Math.max(0, ...over(measured, (each) => each.peak_force_n)), 1) : '\u2013',
-      help: 'of a rigid surface: engines differ in it by how stiff their contacts are',
+      help: 'against a rigid surface; depends on the contact stiffness of the engine',
     },
     {
-      title: 'Force at rest',
+      title: 'Settled force',
       unit: 'N',
       numeric: true,
       cell: ({ measured }) => or(measured?.settled_force_n, fixed(2)),
-      help: 'what the joints\u2019 servo presses with',
+      help: 'force of the joint servo after settling',
     },
     {
       title: 'Impulse',
@@ -515,24 +557,24 @@ NB.sections.press = (with_, configuration, charts, goal, name) => {
           : '\u2013',
     },
     {
-      title: 'Off the balance of torques',
+      title: 'Deviation from static equilibrium',
       numeric: true,
       cell: ({ measured }) => or(measured?.balance_difference, NB.share),
     },
     {
-      title: 'Deepest',
+      title: 'Largest penetration',
       numeric: true,
       cell: ({ measured }) =>
         measured ? NB.length(Math.max(0, ...over(measured, (each) => each.deepest_penetration_m))) : '\u2013',
     },
-    { title: 'Recovers in', unit: 's', numeric: true, cell: ({ measured }) => or(measured?.recovery_s, fixed(3)) },
+    { title: 'Recovery time', unit: 's', numeric: true, cell: ({ measured }) => or(measured?.recovery_s, fixed(3)) },
     {
-      title: 'Engines\u2019 forces differ by',
+      title: 'Force difference between engines',
       numeric: true,
       cell: ({ press }) => or(press.force_difference, NB.share),
     },
     {
-      title: 'Engines\u2019 tips differ by',
+      title: 'Tip difference between engines',
       numeric: true,
       cell: ({ press }) => NB.length(press.tip_difference_settled_m),
     },
@@ -549,18 +591,18 @@ NB.sections.press = (with_, configuration, charts, goal, name) => {
   });
   const means = rows[0].press.force_means;
   return [
-    NB.el('h3', { text: 'Contacts that were asked for' }),
-    NB.el('p', { class: 'bad', text: `Forces are not those on a patient: ${means}.` }),
+    NB.el('h3', { text: 'Prescribed contacts' }),
+    NB.el('p', { class: 'bad', text: `These are not the forces on a patient: ${means}.` }),
     NB.el('p', {
       class: 'soft',
-      text: 'After planning the obstacle is moved before the arm, which is then driven into it.',
+      text: 'After planning, the obstacle is moved into the path of the arm.',
     }),
     own
       ? table(
           `${configuration.label}: contacts by engine`,
           rows.filter(({ c }) => c === own),
         )
-      : NB.el('p', { text: `${configuration.label} does not work: nothing was staged.` }),
+      : NB.el('p', { text: `${configuration.label} is infeasible: no contact was simulated.` }),
     NB.el(
       'details',
       { class: 'no-print' },
@@ -578,7 +620,32 @@ NB.sections.press = (with_, configuration, charts, goal, name) => {
   ];
 };
 
-NB.sections.stop = (with_) => {
+/** Columns on the clearance of a stop or a retreat. */
+NB.clearanceColumns = (page) => [
+  {
+    title: 'Clearance',
+    unit: 'mm',
+    numeric: true,
+    cell: ({ measured }) => NB.mm(NB.leastAround(page, measured.clearance)?.minimum_m),
+    help: 'minimum distance of arm and tool from the surroundings',
+  },
+  {
+    title: 'Certified clearance',
+    unit: 'mm',
+    numeric: true,
+    cell: ({ measured }) => NB.mm(NB.certifiedAround(page, measured.clearance)),
+    help: 'certified lower bound of the clearance',
+  },
+  {
+    title: 'Self-clearance',
+    unit: 'mm',
+    numeric: true,
+    cell: ({ measured }) => NB.mm(measured.clearance.self?.minimum_m),
+    help: 'minimum distance of arm and tool from themselves',
+  },
+];
+
+NB.sections.stop = (page, with_) => {
   const rows = with_.flatMap((c) => {
     const { stop } = c.events;
     return stop ? Object.entries(stop.engines).map(([engine, measured]) => ({ c, stop, engine, measured })) : [];
@@ -588,38 +655,27 @@ NB.sections.stop = (with_) => {
   const columns = [
     { title: 'Configuration', cell: ({ c }) => c.label },
     { title: 'Engine', cell: ({ engine }) => engine },
-    { title: 'Triggered in the', cell: ({ stop }) => NB.words(stop.phase) },
-    { title: 'at', unit: 's', numeric: true, cell: ({ stop }) => NB.fixed(stop.at_s, 2) },
-    { title: 'Stands after', unit: 's', numeric: true, cell: ({ measured }) => NB.fixed(measured.stopping_time_s, 3) },
-    { title: 'Tip goes on', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.tip_distance_m, 2) },
+    { title: 'Trigger phase', cell: ({ stop }) => NB.words(stop.phase) },
+    { title: 'Trigger time', unit: 's', numeric: true, cell: ({ stop }) => NB.fixed(stop.at_s, 2) },
+    { title: 'Stopping time', unit: 's', numeric: true, cell: ({ measured }) => NB.fixed(measured.stopping_time_s, 3) },
+    { title: 'Tip travel', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.tip_distance_m, 2) },
     {
-      title: 'Flange goes on',
+      title: 'Flange travel',
       unit: 'mm',
       numeric: true,
       cell: ({ measured }) => NB.mm(measured.flange_distance_m, 2),
     },
-    { title: 'Off the planned path', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.off_path_m, 2) },
+    { title: 'Path deviation', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.off_path_m, 2) },
+    ...NB.clearanceColumns(page),
     {
-      title: 'Least clearance',
-      unit: 'mm',
-      numeric: true,
-      cell: ({ measured }) => NB.mm(measured.clearance.minimum_m),
-    },
-    {
-      title: 'proven',
-      unit: 'mm',
-      numeric: true,
-      cell: ({ measured }) => NB.mm(measured.clearance.minimum_certified_m),
-    },
-    {
-      title: 'Worst of any moment: tip',
+      title: 'Worst-case tip travel',
       unit: 'mm',
       numeric: true,
       cell: ({ stop }) => NB.mm(stop.envelope.worst_tip_distance_m, 2),
-      help: 'predicted, of stops every 40 ms of the way in',
+      help: 'predicted for stops every 40 ms of the motion to the goal',
     },
     {
-      title: 'time to stand',
+      title: 'Worst-case stopping time',
       unit: 's',
       numeric: true,
       cell: ({ stop }) => NB.fixed(stop.envelope.worst_stopping_time_s, 3),
@@ -628,25 +684,25 @@ NB.sections.stop = (with_) => {
   const { category, brakes } = rows[0].stop;
   const does = [
     'drives off and brakes on at once',
-    'slowed down along the path, then drives off',
-    'slowed down along the path, drives stay on',
+    'decelerated along the path, then drives off',
+    'decelerated along the path, drives stay on',
   ][category];
   return [
     NB.el('h3', { text: 'Emergency stop' }),
     NB.el('p', {
       class: 'soft',
       text:
-        `Category ${category} of IEC 60204-1: ${does}. It is triggered at the moment from which the tip is ` +
-        'predicted to go farthest.',
+        `Category ${category} of IEC 60204-1: ${does}. It is triggered at the time with the largest predicted ` +
+        'tip travel.',
     }),
-    NB.table('How far the arm goes on after the stop', columns, rows, { class: 'small' }),
+    NB.table('Stopping distance', columns, rows, { class: 'small' }),
     brakes
-      ? NB.el('p', { class: 'soft small', text: `Brakes are derived from published stops: ${brakes.fit}.` })
+      ? NB.el('p', { class: 'soft small', text: `Brake model derived from published stops: ${brakes.fit}.` })
       : null,
   ];
 };
 
-NB.sections.retract = (with_) => {
+NB.sections.retract = (page, with_) => {
   const rows = with_.flatMap((c) =>
     Object.entries(c.events.retract).map(([engine, measured]) => ({ c, engine, measured })),
   );
@@ -656,54 +712,43 @@ NB.sections.retract = (with_) => {
     { title: 'Configuration', cell: ({ c }) => c.label },
     { title: 'Engine', cell: ({ engine }) => engine },
     {
-      title: 'Needle in the patient',
+      title: 'Inserted needle length',
       unit: 'mm',
       numeric: true,
       cell: ({ measured }) => NB.mm(measured.inserted_length_m),
     },
     {
-      title: 'Straight way back',
+      title: 'Straight retreat',
       unit: 'mm',
       numeric: true,
       cell: ({ measured }) => NB.mm(measured.straight_length_m),
     },
     {
-      title: 'Needle is out before the arm turns',
+      title: 'Needle cleared before rotation',
       cell: ({ measured }) =>
         NB.el('span', {
           class: measured.needle_clears ? 'good' : 'bad',
-          text: measured.needle_clears ? '\u2713 yes' : '\u2717 no: draw it by hand first',
+          text: measured.needle_clears ? '\u2713 yes' : '\u2717 no, withdraw it by hand first',
         }),
     },
     {
-      title: 'Guide off the needle\u2019s axis',
+      title: 'Lateral guide deviation',
       numeric: true,
       cell: ({ measured }) => NB.length(measured.largest_lateral_deviation_m),
     },
     {
-      title: 'Turned against it',
+      title: 'Angular guide deviation',
       unit: '\u00b5rad',
       numeric: true,
       cell: ({ measured }) => NB.fixed(measured.largest_angle_rad * 1e6, 3),
     },
-    { title: 'Touches', numeric: true, cell: ({ measured }) => String(measured.contacts.length) },
-    {
-      title: 'Least clearance',
-      unit: 'mm',
-      numeric: true,
-      cell: ({ measured }) => NB.mm(measured.clearance.minimum_m),
-    },
-    {
-      title: 'proven',
-      unit: 'mm',
-      numeric: true,
-      cell: ({ measured }) => NB.mm(measured.clearance.minimum_certified_m),
-    },
+    { title: 'Contacts', numeric: true, cell: ({ measured }) => String(measured.contacts.length) },
+    ...NB.clearanceColumns(page),
   ];
   return [
-    NB.el('h3', { text: 'Way back' }),
+    NB.el('h3', { text: 'Retreat' }),
     NB.table(
-      'Straight out along the needle, then back to the start, with the needle still in the guide',
+      'Straight retreat along the needle, then return to the start, with the needle still in the guide',
       columns,
       rows,
       { class: 'small' },

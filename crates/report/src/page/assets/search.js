@@ -1,4 +1,4 @@
-// The page of a search: where the best choice lies, how flat it is there, and what else is as good.
+// The page of a search: the best candidate, the sensitivity about it, and equivalent candidates.
 'use strict';
 
 /**
@@ -25,12 +25,12 @@ class SearchPage {
     NB.clear(
       app,
       this.headline(),
-      NB.el('h2', { class: 'part', text: 'How flat it is, and what else is as good' }),
+      NB.el('h2', { class: 'part', text: 'Sensitivity and equivalent candidates' }),
       NB.el('p', {
         class: 'soft small',
         text:
-          'Each point is a candidate by all layouts that it was judged on; the line is the best of each stretch of ' +
-          'the choice. Few layouts scatter more, so small points say less.',
+          'Each point is a candidate, evaluated on all its layouts; the line is the best candidate of each ' +
+          'interval. Smaller points have fewer layouts and scatter more.',
       }),
       NB.el(
         'div',
@@ -38,9 +38,9 @@ class SearchPage {
         page.factors.map((factor, index) => this.flatness(factor, index)),
       ),
       this.front.size ? NB.el('div', { class: 'figures' }, this.paretoFigure()) : null,
-      NB.el('h2', { class: 'part', text: 'How it was found' }),
+      NB.el('h2', { class: 'part', text: 'Search progress' }),
       NB.el('div', { class: 'figures' }, this.progressFigure(), this.spentPanel()),
-      page.pictures.length ? NB.el('h2', { class: 'part', text: 'What the placements look like' }) : null,
+      page.pictures.length ? NB.el('h2', { class: 'part', text: 'Images of the placements' }) : null,
       page.pictures.length ? NB.el('div', { class: 'panel' }, this.placements()) : null,
       NB.section('All candidates', false, this.candidateTable()),
       NB.section('Generations', false, this.generationTable()),
@@ -68,9 +68,9 @@ class SearchPage {
   /** @param {Estimate} estimate @param {(value: number) => string} show */
   ends({ interval }, show) {
     const { low, high } = interval;
-    if (low === null) return high === null ? '' : ` (97.5 % sure: at most ${show(high)})`;
-    if (high === null) return ` (97.5 % sure: at least ${show(low)})`;
-    return ` (95 % interval ${show(low)} to ${show(high)})`;
+    if (low === null) return high === null ? '' : ` (97.5 % upper confidence bound ${show(high)})`;
+    if (high === null) return ` (97.5 % lower confidence bound ${show(low)})`;
+    return ` (95 % CI ${show(low)} to ${show(high)})`;
   }
 
   headline() {
@@ -79,12 +79,12 @@ class SearchPage {
     const sentence =
       `${page.objectives[0].words} ` +
       `${this.figure(estimate.value)}${this.ends(estimate, (value) => this.figure(value))} on ${estimate.cases} ` +
-      'layouts that nothing was compared by';
+      'held-out layouts';
     const as_good = this.front.size
-      ? `${[...this.front.values()].filter((each) => each.is_certain).length} of ${this.front.size} are on the ` +
-        'front for certain.'
-      : `${this.equals.size - 1} others cannot be told from it; ${this.undecided.size} more were dropped on fewer ` +
-        'layouts and may be as good.';
+      ? `${[...this.front.values()].filter((each) => each.is_certain).length} of ${this.front.size} are certainly ` +
+        'Pareto-optimal.'
+      : `${this.equals.size - 1} others are not significantly different; ${this.undecided.size} more were eliminated ` +
+        'on fewer layouts and may be equivalent.';
     return NB.el(
       'section',
       { class: 'panel answer' },
@@ -101,24 +101,22 @@ class SearchPage {
             factor.key ? [' ', NB.el('code', { class: 'soft', text: factor.key })] : null,
           ),
         ]),
-        NB.el('dt', { text: 'layouts that work' }),
+        NB.el('dt', { text: 'success rate' }),
         NB.el('dd', {
           text: `${this.share(answer.rate.value)}${this.ends(answer.rate, (value) => this.share(value))}`,
         }),
-        NB.el('dt', { text: this.front.size ? 'front' : 'as good' }),
+        NB.el('dt', { text: this.front.size ? 'Pareto front' : 'tied' }),
         NB.el('dd', { text: as_good }),
-        NB.el('dt', { text: 'by the layouts that selected it' }),
+        NB.el('dt', { text: 'on the selection layouts' }),
         NB.el('dd', {
-          text:
-            `${this.figure(answer.selected_by[0].value)}: of many candidates the one that looks best looks better ` +
-            'than it is',
+          text: `${this.figure(answer.selected_by[0].value)}: optimistic (selection bias)`,
         }),
-        NB.el('dt', { text: 'room counted' }),
+        NB.el('dt', { text: 'clearance classes' }),
         NB.el('dd', { text: log.classes.map((name) => NB.words(name)).join(', ') }),
       ),
       NB.el('p', {
         class: 'soft small',
-        text: 'Cases are final postures: whether a motion gets there was not looked at.',
+        text: 'Cases are final postures; motions were not planned.',
       }),
     );
   }
@@ -132,12 +130,21 @@ class SearchPage {
     return 'other';
   }
 
+  /** @type {{ [purpose: string]: string }} */
+  static purposes = {
+    screening: 'screening of the ranges',
+    evolution: 'evolution',
+    halving: 'successive halving',
+    final: 'finalists, all layouts',
+    fresh: 'winner, held-out layouts',
+  };
+
   /** @type {Record<CandidateKind, { color: string, words: string }>} */
   static looks = {
     best: { color: '#d55e00', words: 'best' },
-    equal: { color: '#0072b2', words: 'cannot be told from it' },
-    certain: { color: '#0072b2', words: 'on the front for certain' },
-    maybe: { color: '#56b4e9', words: 'may be on the front' },
+    equal: { color: '#0072b2', words: 'tied with the best' },
+    certain: { color: '#0072b2', words: 'Pareto-optimal' },
+    maybe: { color: '#56b4e9', words: 'possibly Pareto-optimal' },
     other: { color: '#9aa1aa', words: 'others' },
   };
 
@@ -243,7 +250,7 @@ class SearchPage {
       ),
       title: this.axisTitle(0),
     };
-    // Only those with as many layouts as an evolution has: fewer flatter themselves.
+    // Only those with as many layouts as an evolution has: fewer are optimistically biased.
     const least = Math.min(this.log.samples / 4, this.winner.cases);
     /** @type {Map<number, (typeof points)[number]>} */
     const bins = new Map();
@@ -260,7 +267,7 @@ class SearchPage {
       title: factor.words,
       height: 260,
       label: `${this.page.objectives[0].words} over ${factor.words}`,
-      legend: () => this.legend(x.labels ? null : 'best of each stretch'),
+      legend: () => this.legend(x.labels ? null : 'best of each interval'),
       paint: (context, width, height) => {
         const axes = new Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
@@ -315,9 +322,9 @@ class SearchPage {
     const members = points.filter(({ each }) => this.front.get(each.id)?.by_estimate).sort((a, b) => a.x - b.x);
     const figure = new Figure({
       name: `${this.page.name}_front`,
-      title: 'What cannot be improved in one without loss in the other',
+      title: 'Pareto front',
       height: 320,
-      help: 'Bars are 95 % intervals of those that were judged on fresh layouts.',
+      help: 'Bars: 95 % CI of candidates evaluated on held-out layouts.',
       legend: () => this.legend(),
       paint: (context, width, height) => {
         const axes = new Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
@@ -424,10 +431,10 @@ class SearchPage {
     });
     const figure = new Figure({
       name: `${this.page.name}_progress`,
-      title: 'Best and middle of each generation',
+      title: 'Best and median of each generation',
       height: 260,
-      help: 'By the layouts that each had: where those become more, figures may fall.',
-      legend: () => [key('best of the generation', '#d55e00', []), key('middle of the generation', '#666', [5, 3])],
+      help: 'On the layouts of each generation; values may drop as layouts are added.',
+      legend: () => [key('best of the generation', '#d55e00', []), key('median of the generation', '#666', [5, 3])],
       paint: (context, width, height) => {
         const axes = new Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
@@ -449,22 +456,14 @@ class SearchPage {
     /** @type {Map<string, number>} */
     const byPurpose = new Map();
     for (const { purpose, cases } of log.generations) byPurpose.set(purpose, (byPurpose.get(purpose) || 0) + cases);
-    /** @type {{ [purpose: string]: string }} */
-    const words = {
-      screening: 'first look over the ranges',
-      evolution: 'evolution',
-      halving: 'halving',
-      final: 'last candidates, all layouts',
-      fresh: 'winner on fresh layouts',
-    };
     return NB.el(
       'section',
       { class: 'panel' },
-      NB.el('h3', { text: 'What it cost' }),
+      NB.el('h3', { text: 'Computational cost' }),
       NB.table(
-        'Cases by what they were for',
+        'Cases by purpose',
         [
-          { title: 'For', cell: ([purpose]) => words[purpose] || purpose },
+          { title: 'Purpose', cell: ([purpose]) => SearchPage.purposes[purpose] || purpose },
           { title: 'Cases', numeric: true, cell: ([, cases]) => cases },
         ],
         [...byPurpose, ['all', log.cases]],
@@ -472,8 +471,8 @@ class SearchPage {
       NB.el('p', {
         class: 'small',
         text:
-          `${log.grid_cases ? `All choices with all layouts are ${log.grid_cases} cases. ` : ''}Reach alone ruled ` +
-          `out ${counted(log.ruled_out, 'candidate')}, which spared ${counted(log.cases_spared, 'case')}.`,
+          `${log.grid_cases ? `Exhaustive search: ${log.grid_cases} cases. ` : ''}Reachability alone eliminated ` +
+          `${counted(log.ruled_out, 'candidate')} (${counted(log.cases_spared, 'case')} saved).`,
       }),
     );
   }
@@ -482,7 +481,7 @@ class SearchPage {
     return [
       NB.el('p', {
         class: 'soft small',
-        text: 'The patient as the scenario has it, the configuration with the most margin.',
+        text: 'Patient of the scenario, configuration with the largest margin.',
       }),
       NB.el(
         'div',
@@ -496,7 +495,7 @@ class SearchPage {
               'figcaption',
               { class: 'small' },
               NB.el('strong', {
-                text: this.front.size ? 'On the front: ' : picture.id === this.winner.id ? 'Best: ' : 'As good: ',
+                text: this.front.size ? 'Pareto front: ' : picture.id === this.winner.id ? 'Best: ' : 'Tied: ',
               }),
               `${picture.choice}. ${picture.configuration} at ${NB.words(picture.goal)}, margin ` +
                 `${NB.fixed(picture.marginMm, 1)} mm.`,
@@ -524,7 +523,7 @@ class SearchPage {
         ? NB.el('p', { class: 'soft small', text: `The first 200 of ${this.candidates.length}; search.json has all.` })
         : null,
       NB.table(
-        'Candidates, those with the most layouts first',
+        'Candidates, most layouts first',
         [
           { title: 'Number', cell: (each) => each.id },
           ...this.page.factors.map((factor, index) => ({
@@ -539,10 +538,10 @@ class SearchPage {
             numeric: true,
             cell: (/** @type {Candidate} */ each) => this.figure(each.figures[index].value, index),
           })),
-          { title: 'Works', numeric: true, cell: (each) => this.share(each.rate.value) },
+          { title: 'Success rate', numeric: true, cell: (each) => this.share(each.rate.value) },
           {
-            title: '',
-            cell: (each) => kind(each) || (this.undecided.has(each.id) ? 'dropped, may be as good' : ''),
+            title: 'Status',
+            cell: (each) => kind(each) || (this.undecided.has(each.id) ? 'eliminated, may be equivalent' : ''),
           },
         ],
         rows,
@@ -553,16 +552,16 @@ class SearchPage {
 
   generationTable() {
     return NB.table(
-      'Generations, each a study of its own',
+      'Generations, each a separate study',
       [
         { title: 'Generation', cell: (each) => `gen_${String(each.generation).padStart(3, '0')}` },
-        { title: 'For', cell: (each) => each.purpose },
+        { title: 'Purpose', cell: (each) => SearchPage.purposes[each.purpose] || each.purpose },
         { title: 'Candidates', numeric: true, cell: (each) => each.candidates.length },
         {
           title: 'Layouts',
           numeric: true,
           cell: (each) =>
-            `${each.circumstances[0]} to ${each.circumstances[1] - 1}${each.stream === 'fresh' ? ' (fresh)' : ''}`,
+            `${each.circumstances[0]} to ${each.circumstances[1] - 1}${each.stream === 'fresh' ? ' (held-out)' : ''}`,
         },
         { title: 'Cases', numeric: true, cell: (each) => each.cases },
       ],

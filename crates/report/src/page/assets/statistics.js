@@ -1,10 +1,10 @@
 // The statistics of a study: the answer, then all tables.
 'use strict';
 
-/** Lengths below a nanometre are rounding: an exact posture has no error. mm. */
+/** Lengths below a nanometre are rounding: an ideal arm has no error. mm. */
 NB.ROUNDING_MM = 1e-6;
 
-/** Choices that the figure has; the table has more. */
+/** Candidates in the figure; the table has more. */
 NB.MOST_CHOICES = 12;
 
 class Statistics {
@@ -25,7 +25,7 @@ class Statistics {
   }
 
   /**
-   * Whether a metric of the summary is nothing but rounding.
+   * Whether a metric of the summary is rounding only.
    * @param {string} name
    */
   isExact(name) {
@@ -67,7 +67,7 @@ class Statistics {
     return `${one(value)} (${range})`;
   }
 
-  /** What answers the study: its sentence, what it compares, its criteria, and the configurations. */
+  /** The answer of the study: its sentence, its comparison, its criteria, and the configurations. */
   first() {
     const { answer } = this.summary;
     return [
@@ -95,7 +95,7 @@ class Statistics {
     ].filter((each) => each !== null);
   }
 
-  /** Criteria with values, limits, verdicts and the requirements that they stand for. */
+  /** Criteria with values, limits, verdicts and their requirements. */
   criteria() {
     const { criteria = [] } = this.summary;
     if (!criteria.length) return null;
@@ -104,7 +104,7 @@ class Statistics {
       const open = c.value === null || (c.confidence && c.interval === null);
       return NB.el('span', {
         class: c.pass ? 'good' : 'bad',
-        text: c.pass ? '\u2713 met' : open ? '? not judged' : '\u2717 missed',
+        text: c.pass ? '\u2713 met' : open ? '? not evaluated' : '\u2717 failed',
       });
     };
     /** @param {'of' | 'requirement' | 'choice'} key */
@@ -112,16 +112,16 @@ class Statistics {
     /** @type {Column<StudyCriterion>[]} */
     const columns = [
       { title: 'Criterion', cell: (c) => NB.words(c.criterion.replace(/_mm$/, '')) },
-      { title: 'Met', cell: verdict },
+      { title: 'Result', cell: verdict },
       ...(has('of')
         ? [
             {
               title: 'Of',
-              cell: (/** @type {StudyCriterion} */ c) => (c.of === 'best' ? 'best of each layout' : c.of || ''),
+              cell: (/** @type {StudyCriterion} */ c) => (c.of === 'best' ? 'best per layout' : c.of || ''),
             },
           ]
         : []),
-      { title: 'Value (95 %)', numeric: true, cell: (c) => this.text(c.value, c.unit, c.interval) },
+      { title: 'Value (95 % CI)', numeric: true, cell: (c) => this.text(c.value, c.unit, c.interval) },
       {
         title: 'Limit',
         numeric: true,
@@ -131,12 +131,12 @@ class Statistics {
         ? [{ title: 'Requirement', text: true, cell: (/** @type {StudyCriterion} */ c) => c.requirement || '' }]
         : []),
       ...(has('choice')
-        ? [{ title: 'With the best choice', cell: (/** @type {StudyCriterion} */ c) => c.choice || '' }]
+        ? [{ title: 'With the best candidate', cell: (/** @type {StudyCriterion} */ c) => c.choice || '' }]
         : []),
       {
-        title: 'What was judged',
+        title: 'Evaluated quantity',
         text: true,
-        cell: (c) => `${c.detail}${c.confidence ? ', by the unfavourable end of the interval' : ''}`,
+        cell: (c) => `${c.detail}${c.confidence ? ', tested at the unfavourable CI bound' : ''}`,
       },
       { title: 'Worst cases', cell: (c) => this.study.caseButtons((c.cases || []).slice(0, 5)) },
     ];
@@ -147,7 +147,7 @@ class Statistics {
     );
   }
 
-  /** Figures of the choices, or of the levels that are held against each other. */
+  /** Figures of the candidates, or of the levels that are compared. */
   compared() {
     const ranking = this.summary.choices;
     if (ranking) return [this.choices(ranking)];
@@ -167,7 +167,7 @@ class Statistics {
       text: this.rate(choice.works),
       style: style(choice),
     }));
-    const x = { low: 0, high: 100, title: 'layouts in which at least one configuration works (%)' };
+    const x = { low: 0, high: 100, title: 'layouts with a feasible configuration (%)' };
     /** @param {string} color @returns {Mark['draw']} */
     const dot = (color) => (context, a, b) => {
       context.fillStyle = color;
@@ -179,14 +179,14 @@ class Statistics {
     const rest = isCut ? ` The first ${shown.length} of ${choices.length}; the table below has more.` : '';
     this.study.compared = new Figure({
       name: `${this.page.name}-choices`,
-      title: `Which ${names}, best first`,
-      label: `Share of layouts that work, choice by choice`,
-      help: `Share of the layouts that can exist; lines are 95 % intervals of each choice by itself.${rest}`,
+      title: `Candidates for ${names}, best first`,
+      label: 'Success rate by candidate',
+      help: `Share of the valid layouts; lines are individual 95 % CI.${rest}`,
       height: NB.dotHeight(rows.length),
       paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
       legend: () => [
-        { text: 'the first, and what cannot be told apart from it', draw: dot('#0072b2') },
-        { text: 'works less often than the first', draw: dot('#767676') },
+        { text: 'no. 1 and candidates not significantly different from it', draw: dot('#0072b2') },
+        { text: 'significantly lower than no. 1', draw: dot('#767676') },
       ],
     });
     return this.study.compared.element;
@@ -215,8 +215,8 @@ class Statistics {
       name: `${this.page.name}-by-${compared.factor}`,
       title: `By ${NB.words(compared.factor)}: ${compared.response}`,
       help:
-        'Over all other factors; lines are 95 % ' +
-        `intervals.${compared.differs ? '' : ' Chance alone makes such differences in 1 of 20 studies.'}`,
+        'Over all other factors; lines are 95 % CI.' +
+        `${compared.differs ? '' : ' Differences are not significant at the 5 % level.'}`,
       height: NB.dotHeight(rows.length),
       paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
     });
@@ -224,7 +224,7 @@ class Statistics {
     return figure.element;
   }
 
-  /** How often each configuration works. */
+  /** Success rate of each configuration. */
   configurations() {
     const { overall, of_choice: best } = this.summary;
     const rows = this.page.configurations.map((label, c) => {
@@ -237,15 +237,15 @@ class Statistics {
         text: found ? this.rate(found) : `${NB.fixed(100 * rate, 1)} %`,
       };
     });
-    const each = best ? `; intervals hold for all ${best.of} choices at once` : '';
-    const x = { low: 0, high: 100, title: 'layouts in which it works (%)' };
+    const each = best ? `, simultaneous for all ${best.of} candidates` : '';
+    const x = { low: 0, high: 100, title: 'success rate (% of layouts)' };
     this.study.strip = new Figure({
       name: `${this.page.name}-configurations`,
-      title: `How often each configuration works${best ? `, with ${best.label}` : ''}`,
+      title: `Success rate by configuration${best ? `, with ${best.label}` : ''}`,
       help: overall
-        ? `Share of the ${NB.grouped(overall.layouts ?? overall.cases)} layouts that can exist; lines are ` +
-          `${Math.round(100 * (this.summary.confidence || 0.95))} % intervals${each}.`
-        : 'Share of the layouts on this page that can exist.',
+        ? `Share of the ${NB.grouped(overall.layouts ?? overall.cases)} valid layouts; lines are ` +
+          `${Math.round(100 * (this.summary.confidence || 0.95))} % CI${each}.`
+        : 'Share of the valid layouts on this page.',
       height: NB.dotHeight(8),
       paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
     });
@@ -281,28 +281,28 @@ class Statistics {
     };
     const { summary } = this;
     return [
-      ...part(summary.notes, 'What to keep in mind', true, (notes) =>
+      ...part(summary.notes, 'Notes', true, (notes) =>
         NB.el(
           'ul',
           { class: 'plain' },
           notes.map((note) => NB.el('li', { text: String(note) })),
         ),
       ),
-      ...part(summary.choices, 'All choices', true, (ranking) => this.choiceTable(ranking)),
-      ...part(summary.replanned, 'What postures alone overstate', true, (found) => this.replanned(found)),
-      ...part(summary.overall, `What became of the configurations${best}`, true, (overall) =>
+      ...part(summary.choices, 'All candidates', true, (ranking) => this.choiceTable(ranking)),
+      ...part(summary.replanned, 'Postures versus motions', true, (found) => this.replanned(found)),
+      ...part(summary.overall, `Outcomes by configuration${best}`, true, (overall) =>
         [overall, ...(this.summary.goals || [])].map((counts) => this.outcomes(counts)),
       ),
-      ...part(summary.evidence, `Cases worth a look${best}`, true, (evidence) => this.evidence(evidence)),
+      ...part(summary.evidence, `Notable cases${best}`, true, (evidence) => this.evidence(evidence)),
       ...part(summary.spreads, `Quantiles${best}`, false, (spreads) => this.spreads(spreads)),
-      ...part(summary.effects, `Which factor decides${best ? ', over all choices' : ''}`, false, (effects) =>
+      ...part(summary.effects, `Main effects${best ? ', over all candidates' : ''}`, false, (effects) =>
         this.effects(effects),
       ),
-      ...part(summary.regions, `Best configuration by region${best ? ', over all choices' : ''}`, false, (regions) =>
+      ...part(summary.regions, `Best configuration by region${best ? ', over all candidates' : ''}`, false, (regions) =>
         this.regions(regions),
       ),
-      ...part(summary.robustness, 'How far the patient may move', false, (found) => this.robustness(found)),
-      ...part(summary.methods, 'How the numbers were found', false, (methods) =>
+      ...part(summary.robustness, 'Robustness to patient motion', false, (found) => this.robustness(found)),
+      ...part(summary.methods, 'Methods', false, (methods) =>
         NB.table(
           'Methods and their sources',
           [
@@ -314,8 +314,8 @@ class Statistics {
           { class: 'small' },
         ),
       ),
-      NB.section('What each number is', false, this.definitions()),
-      NB.section('Where the numbers come from', false, this.provenance()),
+      NB.section('Definitions', false, this.definitions()),
+      NB.section('Provenance', false, this.provenance()),
     ];
   }
 
@@ -328,7 +328,7 @@ class Statistics {
       found
         ? NB.el('span', {
             title: found.interval
-              ? `95 % interval ${NB.threeDigits(found.interval.low)} to ${NB.threeDigits(found.interval.high)}`
+              ? `95 % CI ${NB.threeDigits(found.interval.low)} to ${NB.threeDigits(found.interval.high)}`
               : found.remark || '',
             text: NB.threeDigits(found.value),
           })
@@ -336,8 +336,8 @@ class Statistics {
     /** @param {Choice} choice */
     const against = ({ against_first: found }) => {
       if (!found) return '';
-      if (!found.distinguishable) return 'not told apart';
-      const points = `${NB.fixed(-100 * found.difference, 1)} points`;
+      if (!found.distinguishable) return 'not significant';
+      const points = `${NB.fixed(-100 * found.difference, 1)} pp`;
       return found.interval
         ? `${points} (${NB.fixed(-100 * found.interval.high, 1)} to ${NB.fixed(-100 * found.interval.low, 1)})`
         : points;
@@ -345,28 +345,33 @@ class Statistics {
     const shown = choices.slice(0, 60);
     return [
       NB.table(
-        `Choices of ${axes.map((axis) => NB.words(axis.name)).join(' and ')}, by ${by}`,
+        `Candidates for ${axes.map((axis) => NB.words(axis.name)).join(' and ')}, ranked by ${by}`,
         [
-          { title: 'Choice', cell: (c) => c.label },
+          { title: 'Candidate', cell: (c) => c.label },
           {
-            title: 'Works (95 %)',
+            title: 'Success rate (95 % CI)',
             numeric: true,
             cell: (c) => this.rate(c.works),
-            help: 'share of the layouts that can exist in which at least one configuration is ok',
+            help: 'share of the valid layouts with at least one feasible configuration',
           },
-          { title: `${k} or more work`, numeric: true, cell: (c) => this.rate(c.works_k) },
-          { title: 'Against the first', numeric: true, cell: against },
+          { title: `${k} or more feasible`, numeric: true, cell: (c) => this.rate(c.works_k) },
           {
-            title: 'Clearance, 5 %',
+            title: 'Difference to no. 1',
+            numeric: true,
+            cell: against,
+            help: 'percentage points (pp), in brackets the 95 % CI',
+          },
+          {
+            title: 'P5 clearance',
             unit: 'mm',
             numeric: true,
             cell: (c) => quantile(c.best_clearance_mm),
-            help: '5 % of the layouts that work have less clearance, with the best configuration of each',
+            help: '5th percentile over the feasible layouts, with the best configuration of each',
           },
           ...(hasError
             ? [
                 {
-                  title: 'Tip error, median',
+                  title: 'Median tip error',
                   unit: 'mm',
                   numeric: true,
                   cell: (/** @type {Choice} */ c) => quantile(c.tip_error_mm),
@@ -375,9 +380,9 @@ class Statistics {
             : []),
           { title: 'Cases', numeric: true, cell: (c) => NB.grouped(c.cases) },
           ...(differs
-            ? [{ title: 'Cannot exist', numeric: true, cell: (/** @type {Choice} */ c) => NB.grouped(c.invalid) }]
+            ? [{ title: 'Invalid layouts', numeric: true, cell: (/** @type {Choice} */ c) => NB.grouped(c.invalid) }]
             : []),
-          { title: 'None works in', cell: (c) => this.study.caseButtons((c.failing || []).slice(0, 5)) },
+          { title: 'Infeasible cases', cell: (c) => this.study.caseButtons((c.failing || []).slice(0, 5)) },
         ],
         shown,
         { class: 'small' },
@@ -394,18 +399,18 @@ class Statistics {
   /** @param {Replanned} replanned */
   replanned({ cases, of, gaps }) {
     return NB.table(
-      `${cases} of ${NB.grouped(of)} static cases, drawn at random, with their motions planned too`,
+      `${cases} of ${NB.grouped(of)} static cases, sampled at random, with motions also planned`,
       [
         { title: 'Configuration', cell: (g) => g.of },
-        { title: 'Works by its posture', numeric: true, cell: (g) => g.by_postures },
-        { title: 'Works with a motion', numeric: true, cell: (g) => g.planned },
+        { title: 'Feasible as posture', numeric: true, cell: (g) => g.by_postures },
+        { title: 'Feasible with motion', numeric: true, cell: (g) => g.planned },
         {
-          title: 'Gap (95 %)',
-          unit: 'points',
+          title: 'Difference, 95 % CI',
+          unit: 'pp',
           numeric: true,
           cell: (g) => (g.interval ? `${NB.fixed(100 * g.gap, 1)} (${this.percents(g.interval)})` : '\u2013'),
         },
-        { title: 'With a motion only', numeric: true, cell: (g) => g.gained },
+        { title: 'With motion only', numeric: true, cell: (g) => g.gained },
       ],
       gaps,
       { class: 'small' },
@@ -425,23 +430,23 @@ class Statistics {
     const notJudged = (c) => NB.grouped(c.not_judged);
     return NB.table(
       `${counts.goal ? `Goal ${NB.words(counts.goal)}` : 'All goals'}: ${NB.grouped(layouts)} ` +
-        `layouts${counts.invalid ? `, ${NB.grouped(counts.invalid)} more cannot exist` : ''}`,
+        `valid layouts${counts.invalid ? `, ${NB.grouped(counts.invalid)} invalid` : ''}`,
       [
         { title: 'Configuration', cell: (c) => c.label },
-        { title: 'Works (95 %)', numeric: true, cell: (c) => this.rate(c.success) },
-        { title: 'Works', numeric: true, cell: (c) => NB.grouped(c.ok) },
-        { title: 'Misses a criterion', numeric: true, cell: (c) => NB.grouped(c.failed) },
+        { title: 'Success rate (95 % CI)', numeric: true, cell: (c) => this.rate(c.success) },
+        { title: 'Feasible', numeric: true, cell: (c) => NB.grouped(c.ok) },
+        { title: 'Failed criterion', numeric: true, cell: (c) => NB.grouped(c.failed) },
         { title: 'Rejected', numeric: true, cell: (c) => NB.grouped(c.rejected) },
         ...(counts.configurations.some((c) => c.not_judged)
-          ? [{ title: 'Not judged', numeric: true, cell: notJudged }]
+          ? [{ title: 'Not evaluated', numeric: true, cell: notJudged }]
           : []),
         {
           title: 'Best',
           numeric: true,
           cell: (c) => NB.grouped(c.best),
-          help: 'works, and has the largest clearance of those that do',
+          help: 'feasible, with the largest clearance',
         },
-        { title: 'Mostly not, by', text: true, cell: why },
+        { title: 'Main failures', text: true, cell: why },
         { title: 'Remark', cell: (c) => c.success?.remark || '' },
       ],
       counts.configurations,
@@ -450,7 +455,7 @@ class Statistics {
   }
 
   /**
-   * Why a configuration does not work, in words.
+   * Why a configuration is infeasible, in words.
    * @param {{ detail: string }} found
    */
   reason({ detail }) {
@@ -459,7 +464,7 @@ class Statistics {
   }
 
   /**
-   * A table for each number that is no rounding.
+   * A table for each metric that is more than rounding.
    * @param {Spread[]} spreads
    */
   spreads(spreads) {
@@ -484,13 +489,13 @@ class Statistics {
     };
     return names.map((name) =>
       NB.table(
-        `${this.metric(name)}: quantiles, with their 95 % intervals below`,
+        `${this.metric(name)}: quantiles, 95 % CI below`,
         [
-          { title: 'Of', cell: (s) => (s.of === 'best' ? 'best of each layout' : s.of) },
+          { title: 'Configuration', cell: (s) => (s.of === 'best' ? 'best per layout' : s.of) },
           { title: 'Layouts', numeric: true, cell: (s) => NB.grouped(s.count) },
           { title: 'Mean', numeric: true, cell: (s) => NB.threeDigits(s.mean) },
           ...shares.map((p) => ({
-            title: p === 0 ? 'least' : p === 1 ? 'largest' : `${NB.significant(100 * p)} %`,
+            title: p === 0 ? 'Minimum' : p === 1 ? 'Maximum' : `P${NB.significant(100 * p)}`,
             numeric: true,
             cell: (/** @type {Spread} */ s) => cell(s.quantiles.find((quantile) => quantile.p === p)),
           })),
@@ -505,32 +510,32 @@ class Statistics {
   effects(effects) {
     /** @type {{ [response: string]: string }} */
     const words = {
-      any_works: 'Whether any configuration works',
-      working: 'How many configurations work',
+      any_works: 'Any configuration feasible',
+      working: 'Number of feasible configurations',
       best_clearance_mm: 'Clearance of the best configuration (mm)',
-      least_tip_error_mm: 'Least tip error of those that work (mm)',
+      least_tip_error_mm: 'Smallest tip error of feasible configurations (mm)',
     };
     /** @param {string} name */
-    const title = (name) =>
-      words[name] || (name.startsWith('success ') ? `Whether ${name.slice(8)} works` : NB.words(name));
+    const title = (name) => words[name] || (name.startsWith('success ') ? `${name.slice(8)} feasible` : NB.words(name));
     const shown = effects.responses.filter(
       (response) => !(response.response.endsWith('_mm') && Math.abs(response.mean ?? 0) < NB.ROUNDING_MM),
     );
     /** @param {Effects['responses'][number]['main'][number]} m */
     const share = (m) =>
-      m.share === null ? '\u2013' : m.share <= (m.noise ?? 0) ? 'as chance' : NB.fixed(100 * m.share, 1);
+      m.share === null ? '\u2013' : m.share <= (m.noise ?? 0) ? 'not significant' : NB.fixed(100 * m.share, 1);
     return shown.map((response) =>
       NB.el(
         'div',
         null,
         NB.table(
-          `${title(response.response)}: share of its variance that a factor explains`,
+          `${title(response.response)}: share of variance explained by each factor`,
           [
             { title: 'Factor', cell: (m) => NB.words(effects.axes[m.axis].name) },
             { title: 'Share', unit: '%', numeric: true, cell: share },
             {
-              title: 'Chance makes up to',
+              title: 'Chance level',
               unit: '%',
+              help: '95th percentile of the share by chance alone',
               numeric: true,
               cell: (m) => NB.fixed(m.noise === null ? NaN : 100 * m.noise, 1),
             },
@@ -541,14 +546,14 @@ class Statistics {
         ),
         response.interactions.some((m) => m.share > m.noise)
           ? NB.table(
-              `${title(response.response)}: pairs of factors, beyond each alone`,
+              `${title(response.response)}: interactions of factor pairs`,
               [
                 {
                   title: 'Factors',
                   cell: (m) => m.axes.map((axis) => NB.words(effects.axes[axis].name)).join(' and '),
                 },
                 { title: 'Share', unit: '%', numeric: true, cell: (m) => NB.fixed(100 * m.share, 1) },
-                { title: 'Chance makes up to', unit: '%', numeric: true, cell: (m) => NB.fixed(100 * m.noise, 1) },
+                { title: 'Chance level', unit: '%', numeric: true, cell: (m) => NB.fixed(100 * m.noise, 1) },
               ],
               response.interactions.filter((m) => m.share > m.noise),
               { class: 'small' },
@@ -573,12 +578,12 @@ class Statistics {
             },
             { title: 'Layouts', numeric: true, cell: ({ cell }) => NB.grouped(cell.layouts) },
             {
-              title: 'Any works',
+              title: 'Any feasible',
               unit: '%',
               numeric: true,
               cell: ({ cell }) => NB.fixed((100 * cell.working) / cell.layouts, 1),
             },
-            { title: 'Most often the best', cell: ({ cell }) => cell.winner || 'none stands out' },
+            { title: 'Most frequent best', cell: ({ cell }) => cell.winner || 'no clear winner' },
           ],
           map.cells.map((cell, at) => ({ cell, bin: axis.bins[at] })),
           { class: 'small' },
@@ -587,53 +592,55 @@ class Statistics {
   }
 
   /**
-   * Smallest moves of the patient that break a configuration, no bounds.
+   * Smallest patient motions that make a configuration infeasible, no bounds.
    * @param {RobustnessResult[]} results
    */
   robustness(results) {
     /** @param {SmallestFound | null | undefined} found */
     const radius = (found) => {
       if (!found) return '\u2013';
-      const text = found.found ? NB.fixed(found.found.radius, 1) : `none to ${NB.significant(found.limit)}`;
+      const text = found.found ? NB.fixed(found.found.radius, 1) : `none up to ${NB.significant(found.limit)}`;
       return `${text}${found.impossible ? '*' : ''}${found.settled ? '' : '?'}`;
     };
     /** @param {RobustnessResult} result */
     const why = ({ shift, tilt }) => NB.words((shift.found || tilt.found)?.detail || '');
     return [
       NB.table(
-        'Smallest moves of the patient of the base scenario that were found to break a configuration',
+        'Smallest patient motions found that make a configuration infeasible (base scenario)',
         [
           { title: 'Goal', cell: (r) => NB.words(r.goal) },
           { title: 'Configuration', cell: (r) => r.configuration },
           { title: 'Shift', unit: 'mm', numeric: true, cell: (r) => radius(r.shift) },
-          { title: 'Turn', unit: 'deg', numeric: true, cell: (r) => radius(r.tilt) },
-          { title: 'Breaks', cell: why },
-          { title: 'Arm stays: shift', unit: 'mm', numeric: true, cell: (r) => radius(r.unaware?.shift) },
-          { title: 'Arm stays: turn', unit: 'deg', numeric: true, cell: (r) => radius(r.unaware?.tilt) },
+          { title: 'Rotation', unit: 'deg', numeric: true, cell: (r) => radius(r.tilt) },
+          { title: 'Cause', cell: why },
+          { title: 'Fixed arm: shift', unit: 'mm', numeric: true, cell: (r) => radius(r.unaware?.shift) },
+          { title: 'Fixed arm: rotation', unit: 'deg', numeric: true, cell: (r) => radius(r.unaware?.tilt) },
         ],
         results,
         { class: 'small' },
       ),
       NB.el('p', {
         class: 'soft small',
-        text:
-          'Found by search, so no bounds: a smaller one may exist. * some layouts within cannot exist and count ' +
-          'neither way; ? nearer ones were still being found.',
+        text: 'Search results, not bounds. * contains invalid layouts (ignored); ? search not converged.',
       }),
     ];
   }
 
-  /** What each number of a case is, and how fine it is kept here. */
+  /** Definition of each quantity of a case, and its resolution on this page. */
   definitions() {
     const { metrics, exact, factors } = this.study;
     /** @type {{ words: string, unit: string, text: string, step?: number }[]} */
     const rows = [
-      { words: 'works', unit: '', text: 'the configuration breaks no rule and misses no criterion of the scenario' },
-      { words: 'layout', unit: '', text: 'a case that can exist: where everything stands, with one goal' },
       {
-        words: 'best of each layout',
+        words: 'feasible',
         unit: '',
-        text: 'of the configurations that work the one with the largest clearance',
+        text: 'the configuration violates no rule and fails no criterion of the scenario',
+      },
+      { words: 'layout', unit: '', text: 'a valid case: the placement of everything, with one goal' },
+      {
+        words: 'best per layout',
+        unit: '',
+        text: 'the feasible configuration with the largest clearance',
       },
       ...metrics.map((metric) => ({
         words: metric.words,
@@ -644,20 +651,20 @@ class Statistics {
       ...exact.map((metric) => ({
         words: metric.words,
         unit: metric.unit,
-        text: `${metric.description} - nothing but rounding in this study, in which the arm is exact: not shown`,
+        text: `${metric.description}; not shown: rounding only, as the arm of this study is ideal`,
       })),
       ...factors
         .filter((factor) => !factor.levels)
         .map((factor) => ({ words: factor.words, unit: factor.unit, text: 'factor', step: factor.column.step })),
     ];
     return NB.table(
-      'Definitions; plots and cases of this page are rounded, the tables of statistics are not',
+      'Definitions; plots and cases on this page are rounded, the tables of statistics are not',
       [
-        { title: 'Number', cell: (row) => row.words },
+        { title: 'Quantity', cell: (row) => row.words },
         { title: 'Unit', cell: (row) => (row.unit === '1' ? '' : row.unit) },
-        { title: 'What it is', text: true, cell: (row) => row.text },
+        { title: 'Definition', text: true, cell: (row) => row.text },
         {
-          title: 'Kept to',
+          title: 'Resolution',
           numeric: true,
           cell: (row) => (row.step === undefined ? '' : `\u00b1 ${NB.threeDigits(row.step / 2)}`),
         },
@@ -677,15 +684,15 @@ class Statistics {
       [
         'program',
         provenance.version
-          ? `needlebench ${provenance.version} (source ${provenance.source_sha256?.slice(0, 12) ?? 'not known'})`
+          ? `needlebench ${provenance.version} (source ${provenance.source_sha256?.slice(0, 12) ?? 'unknown'})`
           : null,
       ],
       ['study file', this.page.file],
       ['seed of the samples', seed ?? provenance.seed],
       ['arithmetic', provenance.arithmetic],
       ['sampling', sampling],
-      ['cases of each sampled point', repeats],
-      ['hash of all that decides the results', id],
+      ['cases per sampled point', repeats],
+      ['hash of everything that affects results', id],
     ];
     return NB.el(
       'div',
@@ -699,7 +706,7 @@ class Statistics {
       ),
       files.length
         ? NB.table(
-            'Files that went in',
+            'Input files',
             [
               { title: 'File', cell: ([file]) => file },
               { title: 'SHA-256', cell: ([, sha256]) => NB.el('code', { text: sha256 }) },
@@ -711,14 +718,14 @@ class Statistics {
       NB.el(
         'details',
         { class: 'no-print' },
-        NB.el('summary', { text: 'everything that study.json says' }),
+        NB.el('summary', { text: 'full content of study.json' }),
         NB.tree(manifest),
       ),
     );
   }
 
   /**
-   * The cases that show what goes wrong, of the best configuration first.
+   * The notable cases, of the best configuration first.
    * @param {Evidence} evidence
    */
   evidence({ invalid = [], fewer_than: fewer = [], configurations = [] }) {
@@ -736,20 +743,20 @@ class Statistics {
           ),
         );
     /** @param {CasesOf} each */
-    const of = (each) => [...line('does not work, first cases', each.not_ok || []), ...worst(each)];
+    const of = (each) => [...line('infeasible, first cases', each.not_ok || []), ...worst(each)];
     const best = configurations.find((each) => each.of === 'best');
     const others = configurations.filter((each) => each.of !== 'best');
     return NB.el(
       'div',
       null,
-      line('no configuration works', fewer[0] || []),
-      line('cannot exist', invalid),
+      line('no feasible configuration', fewer[0] || []),
+      line('invalid layout', invalid),
       best ? worst(best) : null,
       others.length
         ? NB.el(
             'details',
             { class: 'no-print' },
-            NB.el('summary', { text: 'configuration by configuration' }),
+            NB.el('summary', { text: 'by configuration' }),
             others.map((each) => [NB.el('h3', { text: each.of }), of(each)]),
           )
         : null,

@@ -39,7 +39,7 @@ class StudyPage extends StudyPlots {
       values: NB.array(factor.column),
     }));
     const metrics = page.metrics.map((metric) => ({ ...metric, values: NB.array(metric.column) }));
-    // What rounding leaves of an exact arm is no number to be shown.
+    // Rounding errors of an ideal arm are not shown.
     this.exact = metrics.filter((metric) => NB.isRounding(metric));
     this.metrics = metrics.filter((metric) => !NB.isRounding(metric));
     this.outcomes = NB.array(page.outcomes);
@@ -108,7 +108,7 @@ class StudyPage extends StudyPlots {
     return -1;
   }
 
-  /** Verdict, cases, and what has to be known of every figure below. */
+  /** Verdict, cases, and what qualifies every figure below. */
   head() {
     const { cases, kept } = this.page;
     const { criteria = [], verdict, not_judged: open = [] } = this.summary;
@@ -120,15 +120,15 @@ class StudyPage extends StudyPlots {
       { class: 'bar' },
       criteria.length || open.length
         ? NB.verdict(String(verdict))
-        : NB.el('span', { class: 'chip off', text: 'no verdict: the study has no criteria' }),
-      open.length ? NB.el('span', { class: 'error', text: `not judged: ${open.join('; ')}` }) : null,
+        : NB.el('span', { class: 'chip off', text: 'no criteria defined' }),
+      open.length ? NB.el('span', { class: 'error', text: `not evaluated: ${open.join('; ')}` }) : null,
       this.posturesChip(),
       NB.el('span', { text: `${NB.grouped(cases)} cases, each with 8 configurations; varied: ${varied.join(', ')}` }),
       kept < cases
         ? NB.el('strong', {
             text:
-              `The plots show ${NB.grouped(kept)} of them: one of each block of successive cases, drawn by a fixed ` +
-              'rule, and those that the statistics name. All tables of statistics are of all cases.',
+              `The plots show ${NB.grouped(kept)} of them: one sampled from each block of successive cases by a ` +
+              'fixed rule, and those named by the statistics. All tables of statistics cover all cases.',
           })
         : null,
       this.summary.headline
@@ -140,11 +140,11 @@ class StudyPage extends StudyPlots {
     );
   }
 
-  /** That nothing is known of motions, to stand beside figures. */
+  /** A warning that motions were not planned, beside figures. */
   posturesChip() {
-    const words = { all: 'postures only: no motion is planned', some: 'some cases are postures only', none: '' };
+    const words = { all: 'postures only, motions not planned', some: 'some cases are postures only', none: '' };
     const text = words[this.summary.postures_only || 'none'];
-    const route = this.summary.without_route ? 'needle route left out' : '';
+    const route = this.summary.without_route ? 'needle path not checked' : '';
     const chips = [text, route].filter(Boolean);
     return chips.map((each) => NB.el('span', { class: 'chip bad', text: each, title: this.summary.headline || null }));
   }
@@ -164,7 +164,7 @@ class StudyPage extends StudyPlots {
     this.view = this.scene?.view;
     app.append(
       ...this.statistics.first(),
-      NB.el('h2', { class: 'part', text: 'Look into the cases' }),
+      NB.el('h2', { class: 'part', text: 'Cases in detail' }),
       this.controls(),
       ...NB.present([this.shown]),
       NB.el(
@@ -173,7 +173,7 @@ class StudyPage extends StudyPlots {
         NB.el('div', null, this.scatter.element, map.element, this.cellPanel),
         NB.el('div', null, this.scene ? this.scene.element : null, this.casePanel),
       ),
-      NB.el('h2', { class: 'part', text: 'How the numbers spread' }),
+      NB.el('h2', { class: 'part', text: 'Distributions' }),
       NB.el('div', { class: 'bar no-print' }, this.metricSelect),
       NB.el('div', { class: 'pair' }, this.ecdf.element, this.histogram.element),
       NB.el('h2', { class: 'part', text: 'All tables' }),
@@ -191,7 +191,7 @@ class StudyPage extends StudyPlots {
     NB.address.watch((choices) => this.follow(choices));
   }
 
-  /** What the plots show at first: of the best choice, over numbers; or what the address asks for. */
+  /** What the plots show at first: the best candidate, over numeric factors; or what the address specifies. */
   startState() {
     this.asked = NB.address.read();
     const varying = [...this.factors.keys()].filter(
@@ -286,14 +286,14 @@ class StudyPage extends StudyPlots {
     );
     /** @type {[key: string, text: string][]} */
     const configurations = [
-      ['-1', 'best of each layout'],
+      ['-1', 'best per layout'],
       ...this.page.configurations.map((label, index) => /** @type {[string, string]} */ ([String(index), label])),
     ];
     /** @type {[key: string, text: string][]} */
     const colors = [
-      ['outcome', 'what became of it'],
+      ['outcome', 'outcome'],
       ['best', 'best configuration'],
-      ['working', 'how many work'],
+      ['working', 'feasible configurations'],
       ...this.metricOptions(),
     ];
     this.kept = [];
@@ -332,7 +332,7 @@ class StudyPage extends StudyPlots {
     );
     this.metricSelect = this.metrics.length
       ? select(
-          'number',
+          'metric',
           this.metricOptions(),
           () => this.state.metric ?? '',
           (value) => {
@@ -342,9 +342,9 @@ class StudyPage extends StudyPlots {
       : null;
     return NB.el(
       'div',
-      { class: 'bar no-print', role: 'group', 'aria-label': 'What the plots show' },
+      { class: 'bar no-print', role: 'group', 'aria-label': 'Plot settings' },
       select(
-        'across',
+        'x axis',
         options,
         () => String(this.state.x),
         (value) => {
@@ -352,7 +352,7 @@ class StudyPage extends StudyPlots {
         },
       ),
       select(
-        'up',
+        'y axis',
         options,
         () => String(this.state.y),
         (value) => {
@@ -368,7 +368,7 @@ class StudyPage extends StudyPlots {
         },
       ),
       select(
-        'of',
+        'configuration',
         configurations,
         () => String(this.state.configuration),
         (value) => {
@@ -387,9 +387,9 @@ class StudyPage extends StudyPlots {
   figureOfMap() {
     this.map = new Figure({
       name: `${this.page.name}-map`,
-      title: 'Where it works',
-      help: 'Share of the layouts in each cell that work. Click a cell for its cases.',
-      label: 'Map of the share of layouts that work over two factors',
+      title: 'Success rate map',
+      help: 'Share of feasible layouts in each cell. Click a cell for its cases.',
+      label: 'Map of the success rate over two factors',
       height: 400,
       paint: (...all) => this.paintMap(...all),
       legend: () => this.mapItems || [],
@@ -402,8 +402,8 @@ class StudyPage extends StudyPlots {
       name: `${this.page.name}-scatter`,
       title: 'Cases',
       help:
-        'Each mark is a place, of one case or of several: click it for its cases, or go through the numbers beside ' +
-        'it with the arrow keys.',
+        'Each mark is one case, or several at the same position. Click it for its cases, or go through the case ' +
+        'numbers with the arrow keys.',
       label: 'Scatter of the cases over two factors',
       height: 400,
       paint: (...all) => this.paintScatter(...all),
@@ -411,9 +411,9 @@ class StudyPage extends StudyPlots {
     });
     this.ecdf = new Figure({
       name: `${this.page.name}-ecdf`,
-      title: 'Share of layouts below',
-      help: 'Of the layouts in which the configuration is not rejected. Click a curve for the case at that value.',
-      label: 'Share of layouts below a value, configuration by configuration',
+      title: 'Cumulative distribution',
+      help: 'Layouts in which the configuration is not rejected. Click a curve for the case at that value.',
+      label: 'Cumulative distribution by configuration',
       height: 300,
       paint: (...all) => this.paintEcdf(...all),
       legend: () => this.ecdfItems || [],
@@ -421,8 +421,8 @@ class StudyPage extends StudyPlots {
     this.histogram = new Figure({
       name: `${this.page.name}-histogram`,
       title: 'Histogram',
-      help: 'Of the configuration chosen above, where it is not rejected; of the best, where any works.',
-      label: 'Histogram of a number',
+      help: 'Configuration chosen above, where it is not rejected; or the best one, where any is feasible.',
+      label: 'Histogram of the metric',
       height: 300,
       paint: (...all) => this.paintHistogram(...all),
     });
@@ -497,8 +497,7 @@ class StudyPage extends StudyPlots {
     const only = [...this.state.filters].map(
       ([factor, level]) => `${this.factors[factor].words} ${this.factors[factor].levels?.[level].label}`,
     );
-    const postures =
-      this.summary.postures_only === 'all' ? ' Postures only: whether a motion gets there is not known.' : '';
+    const postures = this.summary.postures_only === 'all' ? ' Postures only, motions not planned.' : '';
     this.shown.textContent =
       `${NB.grouped(this.indices.length)} of ${NB.grouped(this.count)} cases are ` +
       `shown${only.length ? `, with ${only.join(', ')}` : ''}.${postures}`;
@@ -509,7 +508,7 @@ class StudyPage extends StudyPlots {
   }
 
   /**
-   * Row of the chosen configuration in a case; -1 where none works.
+   * Row of the chosen configuration in a case; -1 where none is feasible.
    * @param {number} index
    */
   row(index) {
@@ -569,15 +568,17 @@ class StudyPage extends StudyPlots {
     const first = places.first[best];
     if (places.counts[best] === 1) {
       return {
-        text: `case ${this.caseOf(first)}: ${this.outcome(first)}, ${this.working[first]} of 8 configurations work`,
+        text:
+          `case ${this.caseOf(first)}: ${StudyPage.outcomes[this.outcome(first)]}, ` +
+          `${this.working[first]} of 8 configurations feasible`,
         choose: () => this.choose(first),
       };
     }
     const here = [...this.indices].filter((_, at) => places.of[at] === best);
     const working = here.filter((index) => this.outcome(index) === 'ok').length;
     return {
-      text: `${here.length} cases at this place: ${working} work`,
-      choose: () => this.list(here, 'at this place'),
+      text: `${here.length} cases at this position: ${working} feasible`,
+      choose: () => this.list(here, 'at this position'),
     };
   }
 
@@ -627,7 +628,7 @@ class StudyPage extends StudyPlots {
     const cell = cy * nx + cx;
     return {
       text: of[cell]
-        ? `${ok[cell]} of ${of[cell]} layouts work (${Math.round((100 * ok[cell]) / of[cell])} %)`
+        ? `${ok[cell]} of ${of[cell]} layouts feasible (${Math.round((100 * ok[cell]) / of[cell])} %)`
         : 'no layouts',
       choose: () => this.listCell(cx, cy),
     };
@@ -646,7 +647,7 @@ class StudyPage extends StudyPlots {
   }
 
   /**
-   * The first cases of a place or a cell, those that do not work first.
+   * The first cases of a place or a cell, infeasible ones first.
    * @param {number[]} inside
    * @param {string} where
    */
@@ -656,7 +657,7 @@ class StudyPage extends StudyPlots {
       this.cellPanel,
       NB.el('p', {
         class: 'small',
-        text: `${inside.length} cases ${where}; the first 40, those that do not work before others:`,
+        text: `${inside.length} cases ${where}; first 40, infeasible ones first:`,
       }),
       this.caseButtons(inside.slice(0, 40).map((index) => this.caseOf(index))),
     );
@@ -711,7 +712,9 @@ class StudyPage extends StudyPlots {
         cell: (/** @type {number} */ c) => NB.threeDigits(metric.values[c * this.count + index]),
       })),
     ];
-    const table = NB.table('Row: show its posture', columns, [0, 1, 2, 3, 4, 5, 6, 7], { class: 'choose small full' });
+    const table = NB.table('Select a row to show its posture', columns, [0, 1, 2, 3, 4, 5, 6, 7], {
+      class: 'choose small full',
+    });
     const rows = NB.tableRows(table);
     NB.rows(rows, (c) => {
       NB.mark(rows, c);
@@ -731,12 +734,12 @@ class StudyPage extends StudyPlots {
       onchange: (event) => {
         const to = this.indexOf(Number(event.target.value));
         if (to >= 0) this.choose(to);
-        else copied.textContent = 'that case is not on this page; the command reruns any';
+        else copied.textContent = 'this case is not on the page; the command recomputes any case';
       },
     });
     const elsewhere =
       this.indices.indexOf(index) < 0
-        ? NB.el('p', { class: 'soft small', text: 'The filters above leave this case out of the plots.' })
+        ? NB.el('p', { class: 'soft small', text: 'The filters above exclude this case from the plots.' })
         : null;
     NB.clear(
       this.casePanel,
@@ -755,7 +758,7 @@ class StudyPage extends StudyPlots {
       NB.el(
         'p',
         { class: 'small' },
-        'To the last digit, and with all columns: ',
+        'Full precision and all columns: ',
         NB.el('code', { text: command }),
         ' ',
         NB.el('button', { type: 'button', class: 'no-print', onclick: () => this.copy(command, copied) }, 'Copy'),
@@ -767,20 +770,23 @@ class StudyPage extends StudyPlots {
     if (this.started) this.remember();
   }
 
+  /** @type {{ [outcome: string]: string }} */
+  static outcomes = {
+    ok: 'feasible',
+    failed: 'failed criterion',
+    rejected: 'rejected',
+    invalid: 'invalid layout',
+    not_judged: 'not evaluated',
+    'none works': 'no feasible configuration',
+  };
+
   /** @param {number} index @param {number} c */
   outcomeText(index, c) {
     const [outcome, , words] = this.page.outcomeNames[this.outcomes[c * this.count + index]];
     const style = { ok: 'good', failed: 'bad', rejected: 'off', invalid: 'off', not_judged: 'off' }[outcome];
     const sign = { ok: '\u2713', failed: '\u2717', rejected: '\u2013', invalid: '\u2205', not_judged: '?' }[outcome];
-    const name = {
-      ok: 'works',
-      failed: 'misses a criterion',
-      rejected: 'rejected',
-      invalid: 'cannot exist',
-      not_judged: 'not judged',
-    }[outcome];
     return [
-      NB.el('span', { class: style, text: `${sign} ${name}` }),
+      NB.el('span', { class: style, text: `${sign} ${StudyPage.outcomes[outcome]}` }),
       words ? NB.el('div', { class: 'soft', text: words }) : '',
     ];
   }
@@ -791,7 +797,7 @@ class StudyPage extends StudyPlots {
       await navigator.clipboard.writeText(text);
       status.textContent = 'copied';
     } catch {
-      status.textContent = 'mark and copy it by hand: this browser does not allow it here';
+      status.textContent = 'select and copy it by hand: this browser denies access to the clipboard';
     }
   }
 
@@ -811,7 +817,7 @@ class StudyPage extends StudyPlots {
   }
 }
 
-/** Lengths in mm that are nothing but rounding. */
+/** Lengths in mm that are rounding only. */
 NB.isRounding = ({ unit, values }) => {
   if (unit !== 'mm') return false;
   let any = false;

@@ -1,4 +1,4 @@
-// A case of a study in three dimensions: the arm, and what stands about it in that case.
+// A case of a study in three dimensions: the arm, and its surroundings in that case.
 'use strict';
 
 class CaseScene {
@@ -114,9 +114,7 @@ class CaseScene {
       }
     }
     if (this.missing)
-      this.note.textContent +=
-        ` ${this.missing} of the things that stand about the arm in this case are not on the page, and are not ` +
-        'drawn.';
+      this.note.textContent += ` ${this.missing} objects of this case are not stored on the page and not shown.`;
   }
 
   /**
@@ -164,16 +162,13 @@ class CaseScene {
    */
   words(at, title, { has, known, own, hasTool }) {
     if (at === undefined)
-      return (
-        'The posture of this case is not on the page (it holds some thousand): ' +
-        'the command beside it makes it anew.'
-      );
-    if (!known) return 'This layout cannot exist: there is nothing to draw.';
-    if (!own) return 'This case has another arm than the page holds: it is not drawn. --run makes a page of it.';
-    if (!has) return `${title} has no posture. Patient and surroundings are those of this case.`;
+      return 'This page does not store the posture of this case; recompute it with the command shown.';
+    if (!known) return 'Invalid layout: nothing to show.';
+    if (!own) return 'This case has another arm than this page and is not shown; --run makes a page of it.';
+    if (!has) return `${title} has no posture. Patient and surroundings are placed as in this case.`;
     return (
-      `${title}. Arm${hasTool ? ', tool' : ''}, patient and all that stands about them are those of this case, ` +
-      `where they stand in it.${hasTool ? '' : ' Its tool is not on the page, and is not drawn.'}`
+      `${title}. Arm${hasTool ? ', tool' : ''}, patient and surroundings are placed as in this case.` +
+      `${hasTool ? '' : ' Its tool is not stored on the page and not shown.'}`
     );
   }
 }

@@ -70,16 +70,16 @@ class StudyPlots {
       const kinds =
         this.state.configuration < 0
           ? [
-              ['ok', blue, 'square', 'works'],
-              ['none works', red, 'cross', 'none works'],
-              ['invalid', grey, 'dot', 'cannot exist'],
+              ['ok', blue, 'square', 'feasible'],
+              ['none works', red, 'cross', 'none feasible'],
+              ['invalid', grey, 'dot', 'invalid layout'],
             ]
           : [
-              ['ok', blue, 'square', 'works'],
-              ['failed', orange, 'triangle', 'misses a criterion'],
+              ['ok', blue, 'square', 'feasible'],
+              ['failed', orange, 'triangle', 'failed criterion'],
               ['rejected', red, 'cross', 'rejected'],
-              ['not_judged', violet, 'triangle', 'not judged'],
-              ['invalid', grey, 'dot', 'cannot exist'],
+              ['not_judged', violet, 'triangle', 'not evaluated'],
+              ['invalid', grey, 'dot', 'invalid layout'],
             ];
       const at = new Map(kinds.map(([name], index) => [name, index]));
       return { kinds, of: (index) => at.get(this.outcome(index)) ?? kinds.length - 1 };
@@ -94,14 +94,14 @@ class StudyPlots {
         c % 2 ? 'triangle' : 'square',
         label,
       ]);
-      kinds.push(['none works', [190, 190, 190], 'dot', 'none works']);
+      kinds.push(['none works', [190, 190, 190], 'dot', 'none feasible']);
       return { kinds, of: (index) => (this.best[index] < 0 ? 8 : this.best[index]) };
     }
     if (color === 'working') {
       return {
         low: 0,
         high: 8,
-        scale: { low: '0', high: '8', text: 'configurations that work' },
+        scale: { low: '0', high: '8', text: 'feasible configurations' },
         value: (index) => (this.invalid[index] ? NaN : this.working[index]),
       };
     }
@@ -410,19 +410,19 @@ class StudyPlots {
     } else {
       items.push({ ...coloring.scale, color: (share) => NB.rgb(NB.viridis(share)) });
       items.push({
-        text: 'none works, or none has it',
+        text: 'none feasible, or no value',
         draw: (context, x, y) => this.pie(context, x, y, 5, [[[200, 200, 200], 1]]),
       });
     }
     if (places.most > 1) {
       let fewest = Infinity;
       for (const count of places.counts) fewest = Math.min(fewest, count);
-      let shows = coloring.kinds ? 'sectors are shares of its cases' : 'the colour is of their median';
-      if (places.first.length > NB.MOST_MARKS) shows = 'the colour is of the most';
+      let shows = coloring.kinds ? 'sectors: shares of cases' : 'colour: median';
+      if (places.first.length > NB.MOST_MARKS) shows = 'colour: most frequent';
       const cases =
         fewest === places.most ? `${group(places.most)} cases` : `${group(fewest)} to ${group(places.most)} cases`;
       items.push({
-        text: `${group(places.first.length)} places of ${cases} each; ${shows}`,
+        text: `${group(places.first.length)} positions, ${cases} each; ${shows}`,
         draw() {},
       });
     }
@@ -503,8 +503,8 @@ class StudyPlots {
     }
     const text =
       this.state.configuration < 0
-        ? 'layouts in which any configuration works (%)'
-        : `layouts in which ${this.page.configurations[this.state.configuration]} works (%)`;
+        ? 'layouts with a feasible configuration (%)'
+        : `layouts with ${this.page.configurations[this.state.configuration]} feasible (%)`;
     /** @type {(Mark | Scale)[]} */
     const items = [{ low: '0', high: '100', text, color: (share) => NB.rgb(NB.viridis(share)) }];
     this.mapItems = items;
@@ -512,7 +512,7 @@ class StudyPlots {
     for (const count of of) if (count) fewest = Math.min(fewest, count);
     if (fewest < NB.FEW_CASES)
       items.push({
-        text: `how many of how many, where a cell has fewer than ${NB.FEW_CASES} cases: no more than a hint`,
+        text: `counts instead of %: fewer than ${NB.FEW_CASES} cases`,
         draw() {},
       });
   }
@@ -556,7 +556,7 @@ class StudyPlots {
     const axes = new Axes(
       box,
       { low, high, title: this.titleOf(metric) },
-      { low: 0, high: 100, title: 'layouts below (%)' },
+      { low: 0, high: 100, title: 'cumulative share of layouts (%)' },
     );
     if (!context.isPaper) this.ecdfAxes = axes;
     axes.draw(context);
@@ -621,7 +621,7 @@ class StudyPlots {
       }
     const most = Math.max(...counts, 1);
     const box = { left: 62, top: 10, width: width - 76, height: height - 52 };
-    const whose = c < 0 ? 'best of each layout' : this.page.configurations[c];
+    const whose = c < 0 ? 'best per layout' : this.page.configurations[c];
     const axes = new Axes(
       box,
       { low, high, title: `${this.titleOf(metric)}, ${whose}` },

@@ -4,7 +4,7 @@
 /** A column of a journal, and the size of its letters: 85 mm at 96 points to the inch, 8 pt. */
 NB.COLUMN = { mm: 85, px: (85 / 25.4) * 96, font: (8 / 72) * 96 };
 
-/** What a canvas's context does, as SVG. Only what our plots use. */
+/** A canvas context that writes SVG; only what the plots use. */
 class SvgContext {
   /** @param {number} width @param {number} height @param {number} mm */
   constructor(width, height, mm) {

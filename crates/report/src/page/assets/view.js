@@ -11,7 +11,7 @@ NB.matrix = (pose) =>
     new THREE.Vector3(1, 1, 1),
   );
 
-/** Frame of parts that stand in the room and go where the robot's base goes, when somebody moves that. */
+/** Frame of parts that are fixed in the room and move with the robot's base, when that is moved. */
 NB.BASE = -2;
 
 /** Corners of a box about a base and `reach` m out of it, which may hang or be tilted. */
@@ -86,7 +86,7 @@ NB.geometry = (surface) => {
   return geometry;
 };
 
-/** Whether this browser can draw in three dimensions; without a trace of errors if not. */
+/** Whether this browser supports WebGL; without logged errors if not. */
 NB.hasWebgl = () => {
   try {
     const canvas = document.createElement('canvas');
@@ -100,7 +100,7 @@ NB.hasWebgl = () => {
 
 class View {
   /**
-   * `label` says what the picture shows.
+   * `label` describes the picture.
    * @param {Scene} scene
    * @param {string} label
    */
@@ -122,7 +122,7 @@ class View {
         NB.el('p', {
           class: 'no-webgl',
           role: 'status',
-          text: 'No 3D view: this browser has no WebGL 2 (or it is switched off). Tables and plots work all the same.',
+          text: 'No 3D view: this browser has no WebGL 2, or it is switched off. Tables and plots are not affected.',
         }),
       );
       return;
@@ -134,7 +134,7 @@ class View {
     const canvas = this.renderer.domElement;
     canvas.tabIndex = 0;
     canvas.setAttribute('role', 'application');
-    canvas.setAttribute('aria-label', `${label}. Arrow keys turn the view, plus and minus zoom, 0 resets.`);
+    canvas.setAttribute('aria-label', `${label}. Arrow keys rotate the view, plus and minus zoom, 0 resets.`);
     this.element.append(canvas, this.overlay);
     /** @type {THREE.Scene} */
     this.world = new THREE.Scene();

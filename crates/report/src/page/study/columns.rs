@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use needlebench_evaluation::metric::{MetricKey, Precision};
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use needlebench_study::{
     FactorKind, FactorValue, MetricColumn, Outcome, Results, ResultsError, Row,
 };
@@ -98,8 +98,8 @@ pub(super) struct Columns {
     pub joints_deg: Vec<f32>,
 }
 
-/// Which cases are kept: one of each block, by a fixed draw, so that no cycle of the design is met
-/// always at the same place; and those that are noted.
+/// Which cases are kept: one sampled from each block by a fixed rule, so that a cycle of the design is not
+/// met always at the same place; and those that are noted.
 struct Chosen {
     block: u64,
     cases: u64,

@@ -1,13 +1,14 @@
-//! What the cases on a page look like: the arm's tool, and the things that stand about it, each where it
-//! stands in its case.
+//! What the cases on a page look like: the arm's tool, and the things around it, each placed as in its
+//! case.
 
 use std::sync::Arc;
 
-use needlebench_cell::fixtures::Fixture;
-use needlebench_cell::phantom::{Phantom, PhantomPart};
-use needlebench_cell::scenario::ToolSection;
-use needlebench_cell::{PlacedPhantom, ResolvedScenario, Robot};
+use needlebench_cell::Robot;
 use needlebench_kinematics::{Chain, Pose};
+use needlebench_phantom::{Phantom, PhantomPart};
+use needlebench_scenario::fixtures::Fixture;
+use needlebench_scenario::scenario::ToolSection;
+use needlebench_scenario::{PlacedPhantom, ResolvedScenario};
 use serde_json::{Value, json};
 
 use crate::page::pack::Pack;
@@ -145,7 +146,7 @@ impl Looks {
         }
     }
 
-    /// Adds a case; none of a layout that cannot exist.
+    /// Adds a case; none of an invalid layout.
     pub fn push(&mut self, case: Option<&ResolvedScenario>, pack: &mut Pack) {
         let look = case.map_or_else(
             || CaseLook {

@@ -1,12 +1,13 @@
-//! The page of a study: plots from every point of which one gets to the case.
+//! The page of a study: plots in which every point leads to its case.
 
 mod columns;
 mod looks;
 #[cfg(test)]
 mod tests;
 
-use needlebench_cell::{ResolvedScenario, reason_in_words};
+use needlebench_cell::reason_in_words;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::ResolvedScenario;
 use needlebench_study::{FactorKind, Results, ResultsError};
 use serde_json::{Value, json};
 
@@ -38,17 +39,17 @@ pub struct StudyPage<'a> {
     pub results: &'a dyn Results,
     /// Statistics of the table, as in `summary.json`.
     pub summary: &'a Value,
-    /// Where the numbers come from, as in `study.json`.
+    /// Provenance, as in `study.json`.
     pub manifest: &'a Value,
-    /// What cases look like; without it nothing is drawn in three dimensions.
+    /// What cases look like; without it there is no 3D view.
     pub pictures: Option<CasePictures<'a>>,
 }
 
 /// What cases look like.
 pub struct CasePictures<'a> {
-    /// The base scenario, whose arm is drawn.
+    /// The base scenario, whose arm is shown.
     pub base: &'a ResolvedScenario,
-    /// The scenario of a case, none of one that cannot exist.
+    /// The scenario of a case; none of an invalid layout.
     pub scenario_of: &'a dyn Fn(u64) -> Option<ResolvedScenario>,
 }
 
@@ -56,7 +57,7 @@ impl StudyPage<'_> {
     /// The whole page. Reads the results once; keeps at most `MOST_CASES` cases.
     ///
     /// # Errors
-    /// What cannot be read of the results.
+    /// Results that cannot be read.
     pub fn html(&self) -> Result<String, ResultsError> {
         let columns = Columns::read(self.results, &noted_cases(self.summary))?;
         let mut pack = Pack::default();

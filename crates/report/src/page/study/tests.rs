@@ -114,7 +114,7 @@ fn an_empty_table_has_a_page() {
 
 #[test]
 fn a_case_looks_like_itself() {
-    use needlebench_cell::{Change, KeyPath, Overrides, ScenarioFamily, Setting};
+    use needlebench_scenario::{Change, KeyPath, Overrides, ScenarioFamily, Setting};
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let scenario = root.join("scenarios/studies/chest.toml");
     let family = ScenarioFamily::load(&scenario, &Overrides::default()).unwrap();
@@ -176,7 +176,7 @@ fn a_case_looks_like_itself() {
 
 #[test]
 fn an_obstacle_stands_where_its_case_has_it_or_not_at_all() {
-    use needlebench_cell::{Change, KeyPath, Overrides, ScenarioFamily, Setting};
+    use needlebench_scenario::{Change, KeyPath, Overrides, ScenarioFamily, Setting};
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let scenario = root.join("scenarios/hanging.toml");
     let family = ScenarioFamily::load(&scenario, &Overrides::default()).unwrap();

@@ -99,6 +99,8 @@ interface RunDocument extends PageDocument {
   explore: ExploreData;
   goals: GoalExtra[];
   counts: string;
+  /** Notes on what the verdict rests on. */
+  qualifying: string[];
   /** Indices of criteria. */
   missedAsExpected: number[];
   iso9283: TestCharts | null;

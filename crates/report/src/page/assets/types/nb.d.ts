@@ -324,6 +324,10 @@ interface Needlebench {
   listed(texts: (string | null | undefined | false)[]): string;
   criterionWords(name: string): string;
   byClass(clearances: Clearances): [name: string, found: ClassMinimum][];
+  around(page: RunDocument, clearances: Clearances): [name: string, found: ClassMinimum][];
+  leastAround(page: RunDocument, clearances: Clearances): Nearest | null;
+  certifiedAround(page: RunDocument, clearances: Clearances): number | null;
+  clearanceColumns(page: RunDocument): Column<{ measured: { clearance: Clearances } }>[];
   sections: RunSections;
 
   // run.js
@@ -372,7 +376,12 @@ interface RunSections {
   summary(criteria: CriterionResult[]): HTMLElement;
   requirements(report: Report): HTMLElement | null;
   provenance(report: Report): HTMLElement;
-  events(goal: GoalReport, configuration: ConfigurationReport, charts: ConfigurationCharts | null, name: string): Child;
+  events(
+    page: RunDocument,
+    goal: GoalReport,
+    configuration: ConfigurationReport,
+    charts: ConfigurationCharts | null,
+  ): Child;
   press(
     configurations: WithEvents[],
     configuration: ConfigurationReport,
@@ -380,8 +389,8 @@ interface RunSections {
     goal: GoalReport,
     name: string,
   ): Child[];
-  stop(configurations: WithEvents[]): Child[];
-  retract(configurations: WithEvents[]): Child[];
+  stop(page: RunDocument, configurations: WithEvents[]): Child[];
+  retract(page: RunDocument, configurations: WithEvents[]): Child[];
 }
 
 type WithEvents = ConfigurationReport & { events: Events };

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use needlebench_bench::study::StudyColumns;
-use needlebench_cell::study::StudyMode;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::study::StudyMode;
 use needlebench_study::{
     CaseResult, Factor, FactorKind, FactorValue, Level, MetricColumn, Outcome, Results,
     ResultsError, Role, Row,
