@@ -4,13 +4,10 @@
 
 pub mod accuracy;
 pub mod chart;
-pub mod credibility;
 pub mod csv;
 pub mod files;
 mod junit;
-pub mod layout;
 mod markdown;
-pub mod number;
 pub mod page;
 pub mod picture;
 #[cfg(test)]
@@ -24,4 +21,4 @@ pub use markdown::{
     MetricDescription, comparison_markdown, markdown, metric_descriptions, metrics_markdown,
     schema_markdown, study_comparison_markdown,
 };
-pub use table::{Table, plain_table, report_screen, report_text};
+pub use table::{report_screen, report_text};

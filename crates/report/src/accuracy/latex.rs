@@ -1,7 +1,7 @@
 //! The accuracy table as LaTeX, with the package `booktabs`.
 
-use needlebench_cell::published::Anchor;
 use needlebench_evaluation::accuracy::{AccuracyRow, AccuracyTable, QUANTITIES};
+use needlebench_scenario::published::Anchor;
 
 use super::{
     APART, BEFORE, before_in_words, caption, figure, footnotes, hits, is_tested, mean_and_sd,
@@ -98,7 +98,7 @@ fn published_table(lines: &mut Vec<String>, caption: &str, rows: &[Vec<String>])
             .to_owned(),
     );
     lines.push("\\toprule".to_owned());
-    let header = ["Who", "Error", "Measured", "n", "DOI"].map(str::to_owned);
+    let header = ["Source", "Error", "Measured", "n", "DOI"].map(str::to_owned);
     lines.push(row_of(&header));
     lines.push("\\midrule".to_owned());
     lines.extend(rows.iter().map(|row| row_of(row)));

@@ -1,17 +1,17 @@
 //! The accuracy table as Markdown.
 
-use needlebench_cell::published::Anchor;
 use needlebench_evaluation::accuracy::{AccuracyRow, AccuracyTable, QUANTITIES};
+use needlebench_scenario::published::Anchor;
+use needlebench_show::markdown::inline;
 
 use super::{
     APART, BEFORE, before_in_words, caption, cell, figure, footnotes, hits, is_tested, measured,
     own_figures, p_value, published,
 };
-use crate::markdown::escape::inline;
 
 const PLUS_MINUS: &str = "\u{b1}";
 
-/// Caption, table, notes, and what has been published.
+/// Caption, table, notes, and published values.
 pub(crate) fn accuracy_markdown(table: &AccuracyTable) -> String {
     let mut lines = vec![
         format!("# Accuracy: {}", inline(&table.name)),
@@ -44,7 +44,7 @@ pub(crate) fn accuracy_markdown(table: &AccuracyTable) -> String {
     let (before, apart) = published();
     lines.extend([String::new(), format!("## {BEFORE}"), String::new()]);
     lines.extend([before_in_words(table).to_owned(), String::new()]);
-    lines.push("| Who | Error | Measured | In | n | DOI |".to_owned());
+    lines.push("| Source | Error | Measured | System; subject | n | DOI |".to_owned());
     lines.push("|---|--:|---|---|---|---|".to_owned());
     for (heading, text) in own_figures(table, PLUS_MINUS) {
         let name = inline(&table.name);
@@ -55,7 +55,7 @@ pub(crate) fn accuracy_markdown(table: &AccuracyTable) -> String {
     }
     lines.extend(before.iter().map(|anchor| published_row(anchor, None)));
     lines.extend([String::new(), format!("## {APART}"), String::new()]);
-    lines.push("| Who | Error | Error is | Measured | In | n | DOI |".to_owned());
+    lines.push("| Source | Error | Stage | Measured | System; subject | n | DOI |".to_owned());
     lines.push("|---|--:|---|---|---|---|---|".to_owned());
     for anchor in &apart {
         lines.push(published_row(anchor, Some(anchor.stage.words())));

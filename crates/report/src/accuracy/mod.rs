@@ -1,15 +1,15 @@
-//! The accuracy table as papers print it: Markdown, CSV, LaTeX, and lines for a terminal; with what has been
-//! published beside it, like with like.
+//! The accuracy table as papers print it: Markdown, CSV, LaTeX, and lines for a terminal; with comparable
+//! published values.
 
 mod csv;
 mod latex;
 mod markdown;
 mod terminal;
 
-use needlebench_cell::published::{Anchor, Stage, anchors};
 use needlebench_evaluation::accuracy::{
     AccuracyRow, AccuracyTable, QUANTITIES, Spread, TARGET_ED, Test, Tested,
 };
+use needlebench_scenario::published::{Anchor, Stage, anchors};
 
 pub(crate) use csv::accuracy_csv;
 pub(crate) use latex::accuracy_latex;
@@ -21,7 +21,7 @@ const DECIMALS: usize = 2;
 /// Smaller than what two decimals show.
 const SHOWN: f64 = 0.005;
 
-/// A number with two decimals; one that they would hide is said to be small, not none.
+/// A number with two decimals; a smaller one is shown as small, not as zero.
 fn number(value: f64) -> String {
     if value == 0.0 || value.abs() >= SHOWN {
         let text = format!("{value:.DECIMALS$}");
@@ -77,7 +77,7 @@ fn p_value(tested: &Result<Tested, String>) -> String {
     }
 }
 
-/// Quantities that anything was measured of.
+/// Quantities with measured values.
 fn measured(table: &AccuracyTable) -> impl Iterator<Item = usize> + '_ {
     (0..QUANTITIES.len()).filter(|quantity| table.all.spreads[*quantity].is_some())
 }
@@ -87,12 +87,12 @@ fn is_tested(table: &AccuracyTable) -> bool {
     table.tests.iter().any(Result::is_ok)
 }
 
-/// Whether no figure before the insertion is a peer of ours.
+/// Whether the table includes insertion effects, so that published errors before insertion do not compare.
 fn has_insertion_effects(table: &AccuracyTable) -> bool {
     !table.insertion_effects.is_empty()
 }
 
-/// What the table is of, in sentences.
+/// The caption, in sentences.
 fn caption(table: &AccuracyTable) -> Vec<String> {
     let mut lines = vec![format!(
         "Needle placement of {} by {}: mean \u{b1} standard deviation (range).",
@@ -101,15 +101,15 @@ fn caption(table: &AccuracyTable) -> Vec<String> {
     )];
     if has_insertion_effects(table) {
         lines.push(format!(
-            "Errors are those before insertion (robot and registration: where the needle would go through the \
-             guide as it stands) and what is drawn besides: {}, which act on the needle only on its way in. So \
-             no figure before insertion is a peer of these.",
+            "Errors include those before insertion (robot and registration: of the needle's line through the \
+             positioned guide) and sampled insertion effects: {}. They are not comparable with published errors before \
+             insertion.",
             table.insertion_effects.join(", ")
         ));
     } else {
         lines.push(
-            "All errors are before insertion (robot and registration): where the needle would go through the \
-             guide as it stands."
+            "All errors are before insertion (robot and registration): of the needle's line through the \
+             positioned guide."
                 .to_owned(),
         );
     }
@@ -117,13 +117,13 @@ fn caption(table: &AccuracyTable) -> Vec<String> {
     lines
 }
 
-/// What the columns are, in sentences.
+/// Definitions of the columns, in sentences.
 fn footnotes(table: &AccuracyTable) -> Vec<String> {
     let mut lines = vec![
         "ND: normal distance of the planned point from the needle's line; ED: Euclidean distance, at the entry \
-         of where the line meets the skin, at the target of the tip. Depth: deeper is positive. Axial, sagittal: \
-         the angle as these planes of the patient show it. Standard deviation with n - 1; range: least to \
-         largest."
+         to the intersection of the line with the skin, at the target to the tip. Depth: positive if deeper. \
+         Axial, sagittal: angle in these planes of the patient. Standard deviation with n - 1; range: minimum to \
+         maximum."
             .to_owned(),
     ];
     let columns = table.columns.iter().flatten();
@@ -135,16 +135,16 @@ fn footnotes(table: &AccuracyTable) -> Vec<String> {
             .any(|name| !name.contains("_static") && !name.contains("_predicted"));
     let mut kinds = Vec::new();
     if is_simulated {
-        kinds.push("settled in the simulation");
+        kinds.push("simulated, after settling");
     }
     if is_predicted {
         kinds.push(
-            "by the balance of torques at the end of the planned motion (columns with _predicted)",
+            "from static equilibrium at the end of the planned motion (columns with _predicted)",
         );
     }
     if is_static {
         kinds.push(
-            "by the balance of torques in final postures only, without a motion (columns with _static)",
+            "from static equilibrium in final postures only, without a motion (columns with _static)",
         );
     }
     if !kinds.is_empty() {
@@ -167,7 +167,7 @@ fn footnotes(table: &AccuracyTable) -> Vec<String> {
             "Hits: tip within {} mm of the target ({}), of the needles with a measured ED.",
             radius.radius_mm, radius.source
         )),
-        None => lines.push("Hits: no radius is given (--hit-radius MM).".to_owned()),
+        None => lines.push("Hits: no radius given (--hit-radius MM).".to_owned()),
     }
     lines.push(tests_in_words(table));
     lines.push(
@@ -180,16 +180,14 @@ fn footnotes(table: &AccuracyTable) -> Vec<String> {
 
 fn tests_in_words(table: &AccuracyTable) -> String {
     if table.groups.len() < 2 {
-        return "p: there is one group.".to_owned();
+        return "p: not tested: only one group.".to_owned();
     }
     let mut tests: Vec<Test> = table.tests.iter().flatten().map(|each| each.test).collect();
     tests.dedup();
     if let Some(test) = tests.first() {
         let what = match test {
-            Test::Friedman => {
-                "of the draws that all groups share, each draw's mean in a group being one value"
-            }
-            Test::KruskalWallis => "each draw's mean in a group being one value",
+            Test::Friedman => "on the draws that all groups share, one mean per draw and group",
+            Test::KruskalWallis => "one mean per draw and group",
         };
         return format!("p: {} test between the groups, {what}.", test.name());
     }
@@ -198,23 +196,23 @@ fn tests_in_words(table: &AccuracyTable) -> String {
     format!("p: not tested: {why}.")
 }
 
-/// Published figures: those that are before insertion, and the others.
+/// Published values: those before insertion, and the others.
 fn published() -> (Vec<&'static Anchor>, Vec<&'static Anchor>) {
     anchors()
         .iter()
         .partition(|each| each.stage == Stage::BeforeInsertion)
 }
 
-const BEFORE: &str = "Published, before insertion";
-const APART: &str = "Published, not before insertion: no peers of this table";
+const BEFORE: &str = "Published errors before insertion";
+const APART: &str = "Published errors not before insertion, not comparable with this table";
 
-/// What stands over the published figures before insertion.
+/// The note above the published errors before insertion.
 fn before_in_words(table: &AccuracyTable) -> &'static str {
     if has_insertion_effects(table) {
-        "No peers of this table, which has effects of the insertion in it."
+        "Not comparable with this table, which includes insertion effects."
     } else {
-        "Errors of robot and registration, as this table's. What each source measures is said: only the same \
-         quantity compares."
+        "Errors of robot and registration, as in this table. Compare equal quantities only; each row names what \
+         was measured."
     }
 }
 
@@ -231,7 +229,7 @@ fn figure(anchor: &Anchor, plus_minus: &str) -> String {
     format!("{value}{sd} {}{statistic}", anchor.unit)
 }
 
-/// Our own figures that a published one in the same column would be held against.
+/// Our own values that compare with published ones.
 fn own_figures(table: &AccuracyTable, plus_minus: &str) -> Vec<(String, String)> {
     ["target_nd", "target_ed"]
         .iter()

@@ -1,13 +1,13 @@
 //! The accuracy table for a terminal of 80 columns: groups side by side, as many as fit.
 
-use needlebench_cell::published::Anchor;
 use needlebench_evaluation::accuracy::{AccuracyRow, AccuracyTable, QUANTITIES};
+use needlebench_scenario::published::Anchor;
+use needlebench_show::plain_table;
 
 use super::{
     APART, BEFORE, before_in_words, caption, figure, footnotes, hits, is_tested, mean_and_sd,
     measured, p_value, published, range,
 };
-use crate::table::plain_table;
 
 /// Columns of a terminal.
 const WIDTH: usize = 80;
@@ -44,7 +44,7 @@ pub fn accuracy_text(table: &AccuracyTable) -> String {
     ));
     text.extend(before.into_iter().map(line));
     let count = apart.len();
-    let more = format!("{APART}: {count} figures, in accuracy.md with their DOIs.");
+    let more = format!("{APART}: {count} values with DOIs in accuracy.md.");
     text.push_str(&wrapped(&more, ""));
     text
 }

@@ -121,8 +121,8 @@ fn totals_never_stand_among_figures_before_insertion() {
     // With bending of the needle in it ours is no peer of any.
     table.insertion_effects = vec!["needle".to_owned()];
     let text = accuracy_markdown(&table);
-    assert!(text.contains("No peers of this table"), "{text}");
-    assert!(text.contains("needle, which act on the needle only on its way in"));
+    assert!(text.contains("Not comparable with this table"), "{text}");
+    assert!(text.contains("sampled insertion effects: needle"));
     assert!(!text.contains("All errors are before insertion"));
 }
 

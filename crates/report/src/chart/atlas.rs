@@ -1,18 +1,18 @@
-//! The atlas as a chart: a band per configuration, roll from left to right.
+//! The roll map as a chart: a band per configuration, roll from left to right.
 //!
-//! The upper part of a band is the least clearance of the final posture, red where it is negative and
-//! blue where it is positive; the lower part is the rule that rejects it, or blue where it works. A tick marks the best roll
-//! of each range.
+//! The upper part of a band is the least clearance of the final posture, red where it is negative and blue where it is
+//! positive; the lower part is the rule that rejects it, or blue where it is feasible. A tick marks the best roll of
+//! each range.
 
 use std::f64::consts::TAU;
 
 use needlebench_bench::GoalAtlas;
-use needlebench_cell::{Goal, Roll};
-use needlebench_planning::{Member, Rule};
-
-use super::drawing::{Anchor, Chart, Mark, Size};
-use super::legend::{ROW_PX, Sample, legend};
-use super::paint::{Paint, Rgb, Stroke, mixed};
+use needlebench_cell::Rule;
+use needlebench_planning::Member;
+use needlebench_scenario::{Goal, Roll};
+use needlebench_show::chart::{
+    Anchor, Chart, LEGEND_ROW_PX, Mark, Paint, Rgb, Sample, Size, Stroke, legend, mixed,
+};
 
 /// Width of the map, px: three per degree.
 const MAP_PX: f64 = 1080.0;
@@ -58,7 +58,7 @@ pub(crate) fn rule_colors() -> impl Iterator<Item = (&'static str, Rgb)> {
 pub(crate) fn atlas_chart(scenario: &str, goal: &Goal, atlas: &GoalAtlas) -> Chart {
     let foot = TOP_PX + atlas.families.len() as f64 * BAND_PX;
     let title = format!(
-        "{scenario}, goal {}: least clearance by configuration and roll",
+        "{scenario}, goal {}: minimum clearance by configuration and roll",
         goal.name
     );
     let size = [LEFT_PX + MAP_PX + RIGHT_PX, foot + LEGEND_PX + 130.0];
@@ -74,9 +74,9 @@ pub(crate) fn atlas_chart(scenario: &str, goal: &Goal, atlas: &GoalAtlas) -> Cha
             .map(|range| range.width_rad().to_degrees())
             .sum();
         let works = if family.ranges.is_empty() {
-            "works nowhere".to_owned()
+            "infeasible".to_owned()
         } else {
-            format!("works for {width_deg:.0} deg")
+            format!("feasible for {width_deg:.0} deg")
         };
         chart.write(Anchor::Start, [20.0, top + 32.0], works);
         let members = &atlas.members[index];
@@ -174,7 +174,7 @@ fn key(chart: &mut Chart, top: f64, atlas: &GoalAtlas) {
     const SCALE_PX: f64 = 400.0;
     const STEPS: u32 = 200;
     chart.write(Anchor::Start, [20.0, top + 9.0], "upper strip:");
-    chart.write(Anchor::Start, [20.0, top + 29.0], "least clearance (mm)");
+    chart.write(Anchor::Start, [20.0, top + 29.0], "minimum clearance (mm)");
     for step in 0..STEPS {
         let share = (2.0 * f64::from(step) + 1.0) / f64::from(STEPS) - 1.0;
         let width = SCALE_PX / f64::from(STEPS);
@@ -188,7 +188,7 @@ fn key(chart: &mut Chart, top: f64, atlas: &GoalAtlas) {
         (0.25, "-25"),
         (0.5, "0"),
         (0.75, "25"),
-        (1.0, "50 and more"),
+        (1.0, "50 or more"),
     ] {
         let x = LEFT_PX + share * SCALE_PX;
         chart.line(
@@ -205,9 +205,9 @@ fn key(chart: &mut Chart, top: f64, atlas: &GoalAtlas) {
     chart.write(Anchor::Start, [right + 290.0, top + 9.0], best);
     let row = top + 70.0;
     chart.write(Anchor::Start, [20.0, row], "lower strip");
-    let works = [(Sample::Area(Paint::Fixed(WORKS)), "works")];
+    let works = [(Sample::Area(Paint::Fixed(WORKS)), "feasible")];
     legend(chart, [LEFT_PX, row], MAP_PX, works);
-    chart.write(Anchor::Start, [20.0, row + ROW_PX], "rejected by");
+    chart.write(Anchor::Start, [20.0, row + LEGEND_ROW_PX], "rejected by");
     let rules = RULES.iter().filter(|(rule, _)| occurs(atlas, *rule));
     let names: Vec<(String, Rgb)> = rules
         .map(|(rule, color)| (rule.name().replace('_', " "), *color))
@@ -215,7 +215,12 @@ fn key(chart: &mut Chart, top: f64, atlas: &GoalAtlas) {
     let entries = names
         .iter()
         .map(|(name, color)| (Sample::Area(Paint::Fixed(*color)), name.as_str()));
-    legend(chart, [LEFT_PX, row + ROW_PX], MAP_PX + RIGHT_PX, entries);
+    legend(
+        chart,
+        [LEFT_PX, row + LEGEND_ROW_PX],
+        MAP_PX + RIGHT_PX,
+        entries,
+    );
 }
 
 fn occurs(atlas: &GoalAtlas, rule: Rule) -> bool {
@@ -274,18 +279,17 @@ mod tests {
     use std::path::Path;
 
     use needlebench_bench::goal_atlas;
-    use needlebench_cell::{Overrides, load_scenario};
     use needlebench_clearance::ClearanceModel;
     use needlebench_planning::Aim;
+    use needlebench_scenario::{Overrides, load_scenario};
 
-    use super::super::drawing::tests::assert_legible;
-    use super::super::paint::tests::assert_told_apart;
     use super::*;
+    use needlebench_show::chart::confused;
 
     #[test]
     fn rules_are_told_apart_with_any_colour_vision() {
         let colors: Vec<Rgb> = rule_colors().map(|(_, color)| color).collect();
-        assert_told_apart(&colors);
+        assert_eq!(confused(&colors), None);
     }
 
     #[test]
@@ -299,7 +303,7 @@ mod tests {
         for roll in [Roll::Free, Roll::Fixed(0.0), Roll::Fixed(6.2)] {
             goal.roll = roll;
             let chart = atlas_chart("small", &goal, &atlas);
-            assert_legible(&chart);
+            assert_eq!(chart.illegible(), None);
         }
         let chart = atlas_chart("small", &goal, &atlas);
         let mut covered = 0.0;

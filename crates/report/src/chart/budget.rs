@@ -1,14 +1,12 @@
 //! Where the needle goes: error budgets as ellipses, and the shares of the sources.
 
 use needlebench_evaluation::report::GoalReport;
+use needlebench_show::chart::{
+    Anchor, Axis, Chart, LEGEND_ROW_PX, Paint, Panel, Sample, Size, Stroke, legend,
+};
 use needlebench_uncertainty::Source;
 use needlebench_uncertainty::budget::{ErrorBudget, Moments, SourceBudget};
 
-use super::axis::Axis;
-use super::drawing::{Anchor, Chart, Size};
-use super::legend::{ROW_PX, Sample, legend};
-use super::paint::{Paint, Stroke};
-use super::panel::Panel;
 use crate::table::budget::{ALLOWED_M, budgets, mm};
 
 /// Side of a panel, px.
@@ -22,7 +20,7 @@ const BAR_PX: f64 = 14.0;
 /// Width and height of a tile, and the space around it, px.
 const TILE_PX: [f64; 2] = [
     2.0 * (BESIDE_PX + PANEL_PX),
-    ABOVE_PX + PANEL_PX + BELOW_PX + BAR_PX + SHARES_ROWS as f64 * ROW_PX + 6.0,
+    ABOVE_PX + PANEL_PX + BELOW_PX + BAR_PX + SHARES_ROWS as f64 * LEGEND_ROW_PX + 6.0,
 ];
 /// Rows of names below the bar of shares.
 const SHARES_ROWS: usize = 2;
@@ -71,13 +69,13 @@ pub(crate) fn budget_figure(goal: &GoalReport, label: &str) -> Option<Chart> {
         .map(|(configuration, budget)| (configuration.label, budget))
         .collect();
     let (label, budget) = of_all.iter().find(|(each, _)| *each == label)?;
-    let title = format!("{}, {label}: where the needle goes", goal.name);
+    let title = format!("{}, {label}: distribution of needle positions", goal.name);
     let named = named_sources(&of_all);
     Some(tiles(title, &[(label, budget)], reach_m(&of_all), &named))
 }
 
 fn chart(goal: &str, budgets: &[(&str, &ErrorBudget)]) -> Chart {
-    let title = format!("{goal}: where the needle goes");
+    let title = format!("{goal}: distribution of needle positions");
     tiles(title, budgets, reach_m(budgets), &named_sources(budgets))
 }
 
@@ -101,16 +99,22 @@ fn tiles(title: String, budgets: &[(&str, &ErrorBudget)], reach_m: f64, named: &
     if columns == COLUMNS {
         chart.write_large([GAP_PX, 24.0], title);
     }
-    let allowed = format!("{} mm: what radiologists allow on average", mm(ALLOWED_M));
+    let allowed = format!(
+        "{} mm: largest error accepted by radiologists, mean",
+        mm(ALLOWED_M)
+    );
     let entries = [
-        (Sample::Line(TARGET), "95 % at the target"),
-        (Sample::Line(SKIN), "95 % at the skin"),
-        (Sample::Line(DRAWN), "95 % at the target, by draws"),
+        (Sample::Line(TARGET), "95 % ellipse at the target"),
+        (Sample::Line(SKIN), "95 % ellipse at the skin"),
+        (
+            Sample::Line(DRAWN),
+            "95 % ellipse at the target, from draws",
+        ),
         (Sample::Circle(8.0, limit()), &*allowed),
     ];
     let key = if columns == COLUMNS { 56.0 } else { 20.0 };
     let rows = legend(&mut chart, [GAP_PX, key], width - 2.0 * GAP_PX, entries);
-    let top = key + ROW_PX * rows as f64;
+    let top = key + LEGEND_ROW_PX * rows as f64;
     for (index, (label, budget)) in budgets.iter().enumerate() {
         let corner = [
             GAP_PX + (index % columns) as f64 * (TILE_PX[0] + GAP_PX),
@@ -136,7 +140,7 @@ fn tile(
 ) {
     let total = &budget.total;
     let heading = format!(
-        "{label}: {} mm rms, {} mm across",
+        "{label}: {} mm RMS, {} mm lateral",
         mm(total.at_target.analytic.rms_m),
         mm(total.at_target.analytic.lateral_rms_m)
     );
@@ -144,9 +148,9 @@ fn tile(
     let reach_mm = 1e3 * reach_m;
     let axis = |name: &str| Axis::linear(format!("{name} (mm)"), -reach_mm, reach_mm);
     let panels = [
-        (1, "y, across"),
+        (1, "y, lateral"),
         // Along the needle.
-        (2, "z, along"),
+        (2, "z, depth"),
     ];
     for (place, (vertical, name)) in panels.into_iter().enumerate() {
         let panel = Panel {
@@ -156,7 +160,7 @@ fn tile(
             ],
             size: [PANEL_PX; 2],
             title: String::new(),
-            x: axis("x, across"),
+            x: axis("x, lateral"),
             y: axis(name),
         };
         panel.draw(chart);
@@ -285,7 +289,7 @@ fn shares(
             if row > SHARES_ROWS {
                 break;
             }
-            (x, y) = (left, y + ROW_PX);
+            (x, y) = (left, y + LEGEND_ROW_PX);
         }
         chart.fill([x, y - 5.0], [10.0, 10.0], color);
         chart.write(Anchor::Start, [x + 10.0 + SPACE_PX[0], y], name);
@@ -297,7 +301,6 @@ fn shares(
 mod tests {
     use needlebench_uncertainty::budget::PointBudget;
 
-    use super::super::drawing::tests::assert_legible;
     use super::*;
 
     fn point(rms_m: f64) -> PointBudget {
@@ -344,7 +347,7 @@ mod tests {
             };
             let budgets = [("Right-Down-Unfold", &budget), ("Left-Up-Fold", &budget)];
             for count in [1, 2] {
-                assert_legible(&chart("a_goal", &budgets[..count]));
+                assert_eq!(chart("a_goal", &budgets[..count]).illegible(), None);
                 // At 85 mm, 8 pt are a thirtieth of the width: 13 px of 400.
                 if count == 1 {
                     let narrow = chart("a_goal", &budgets[..1]).size[0];

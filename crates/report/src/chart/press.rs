@@ -1,15 +1,13 @@
-//! Force and clearance of a contact that was asked for, over time.
+//! Force and clearance of a prescribed contact, over time.
 
 use needlebench_bench::EventRun;
 use needlebench_cell::pair_in_words;
 use needlebench_engine::Recording;
 use needlebench_planning::PressPlan;
+use needlebench_show::chart::{
+    Anchor, Axis, Chart, Overlay, Paint, Panel, Sample, Size, legend, round_step,
+};
 
-use super::axis::{Axis, round_step};
-use super::drawing::{Anchor, Chart};
-use super::legend::{Sample, legend};
-use super::paint::{Overlay, Paint};
-use super::panel::Panel;
 use crate::csv::press::{STRIDE, clearance_m};
 
 const SIZE_PX: [f64; 2] = [1000.0, 760.0];
@@ -106,7 +104,7 @@ fn chart(title: &str, duration_s: f64, phases: &[Phase], curves: &[Curves]) -> C
         for phase in phases {
             let [left, _] = panel.at([phase.start_s, panel.y.low]);
             let [right, _] = panel.at([phase.end_s, panel.y.low]);
-            if super::drawing::Size::Small.width(phase.name) + 10.0 <= right - left {
+            if Size::Small.width(phase.name) + 10.0 <= right - left {
                 chart.write(Anchor::Start, [left + 6.0, top + 13.0], phase.name);
             }
         }
@@ -143,7 +141,6 @@ fn with_zero(label: &str, values: impl Iterator<Item = f64>) -> Axis {
 
 #[cfg(test)]
 mod tests {
-    use super::super::drawing::tests::assert_legible;
     use super::*;
 
     #[test]
@@ -170,7 +167,7 @@ mod tests {
             &phases,
             &curves,
         );
-        assert_legible(&chart);
+        assert_eq!(chart.illegible(), None);
         let svg = chart.to_svg();
         for (index, engine) in engines.iter().enumerate() {
             assert!(svg.contains(&format!(">{engine}</text>")), "{engine}");
@@ -183,6 +180,6 @@ mod tests {
 
     #[test]
     fn a_contact_that_nobody_recorded_has_axes_only() {
-        assert_legible(&chart("title", 1.0, &[], &[]));
+        assert_eq!(chart("title", 1.0, &[], &[]).illegible(), None);
     }
 }

@@ -1,9 +1,8 @@
 //! The ranking of a goal: what each score is made of.
 
 use needlebench_evaluation::report::GoalReport;
+use needlebench_show::chart::{Chart, WeightedBars, WeightedRow, weighted_bars};
 
-use super::drawing::Chart;
-use super::weighted_bars::{WeightedBars, WeightedRow, weighted_bars};
 use crate::table::ranking::{counted, rows, value_and_contribution, words};
 
 /// The ranking as a chart; none if fewer than two configurations were ranked.
@@ -14,8 +13,8 @@ pub(crate) fn ranking_chart(goal: &GoalReport) -> Option<Chart> {
     let bars = WeightedBars {
         title: format!("{}: ranking", goal.name),
         remark:
-            "a column is as wide as its metric's weight and filled to the utility of the value, \
-                 so the filled part of a row is its score"
+            "column width: weight of the metric; fill: utility of the value; filled area of a row: \
+             its score"
                 .to_owned(),
         columns: metrics
             .iter()

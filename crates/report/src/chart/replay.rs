@@ -2,12 +2,7 @@
 
 use needlebench_bench::replay::{Course, Replay};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS};
-
-use super::axis::Axis;
-use super::drawing::Chart;
-use super::legend::{Sample, legend};
-use super::paint::{Overlay, Paint, Stroke};
-use super::panel::Panel;
+use needlebench_show::chart::{Axis, Chart, Overlay, Paint, Panel, Sample, Stroke, legend};
 
 /// Wider than the engines' curves, which are drawn over it and leave a rim of it to be seen.
 const REAL: Stroke = Stroke {
@@ -20,7 +15,7 @@ const LEFT_PX: f64 = 84.0;
 const TOP_PX: f64 = 106.0;
 const COLUMNS: usize = 3;
 const COLUMN_PX: f64 = 500.0;
-const ROW_PX: f64 = 244.0;
+const LEGEND_ROW_PX: f64 = 244.0;
 const PANEL_PX: [f64; 2] = [400.0, 180.0];
 
 /// Upright strips of a panel, each drawn by its lowest and highest value.
@@ -34,7 +29,7 @@ pub(crate) fn replay_chart(replay: &Replay) -> Chart {
     );
     let size = [
         LEFT_PX + COLUMNS as f64 * COLUMN_PX - 60.0,
-        TOP_PX + JOINT_COUNT as f64 * ROW_PX,
+        TOP_PX + JOINT_COUNT as f64 * LEGEND_ROW_PX,
     ];
     let mut chart = Chart::new(size, &*title);
     chart.write_large([20.0, 24.0], title);
@@ -78,7 +73,7 @@ fn columns(replay: &Replay, joint: usize) -> [Column<'_>; COLUMNS] {
     [
         Column {
             label: "error (mrad)",
-            what: "angle less set-point",
+            what: "angle minus set-point",
             real: target.map(|target| -> OfRow<'_> {
                 Box::new(move |row| (run.actual_q[row][joint] - target[row].position[joint]) * 1e3)
             }),
@@ -86,13 +81,13 @@ fn columns(replay: &Replay, joint: usize) -> [Column<'_>; COLUMNS] {
         },
         Column {
             label: "torque (N m)",
-            what: "at the links; real: target_moment",
+            what: "at the links; real arm: target_moment",
             real: moment.map(|moment| -> OfRow<'_> { Box::new(move |row| moment[row][joint]) }),
             engine: Some(Box::new(move |course, row| course.link_nm[row][joint])),
         },
         Column {
             label: "current (A)",
-            what: "of the motor, as measured",
+            what: "of the motor, measured",
             real: current.map(|current| -> OfRow<'_> { Box::new(move |row| current[row][joint]) }),
             engine: constant.map(|constant| -> OfCourse<'_> {
                 Box::new(move |course, row| course.motor_nm[row][joint] / constant)
@@ -123,7 +118,7 @@ fn row(chart: &mut Chart, replay: &Replay, overlay: Overlay, joint: usize) {
         let panel = Panel {
             corner: [
                 LEFT_PX + place as f64 * COLUMN_PX,
-                TOP_PX + joint as f64 * ROW_PX,
+                TOP_PX + joint as f64 * LEGEND_ROW_PX,
             ],
             size: PANEL_PX,
             title: format!("{}: {}", JOINT_LABELS[joint], column.what),

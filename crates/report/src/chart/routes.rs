@@ -3,18 +3,16 @@
 use std::collections::BTreeMap;
 
 use needlebench_bench::routes::RoutePlan;
+use needlebench_show::chart::{Anchor, Chart, Paint, Rgb, Sample, legend, mixed};
 use serde::Serialize;
 
-use super::drawing::{Anchor, Chart};
-use super::legend::{Sample, legend};
-use super::paint::{Paint, Rgb, mixed};
 use super::skin_map::{HIGHEST_DEG, numbered, skin_panel};
 
 /// Colours of rules, told apart by lightness too.
 const RULES: [(&str, &str, Rgb); 12] = [
     ("needle_too_short", "needle too short", [226, 226, 226]),
     ("outside", "arm, fold or marker", [120, 120, 120]),
-    ("end_of_body", "skin not known", [176, 190, 220]),
+    ("end_of_body", "skin unknown", [176, 190, 220]),
     ("oblique", "too oblique", [206, 214, 235]),
     ("bone", "bone", [150, 110, 60]),
     ("vessel", "vessel", [196, 44, 52]),
@@ -22,11 +20,11 @@ const RULES: [(&str, &str, Rgb); 12] = [
     ("pleura", "enters lungs twice", [150, 90, 160]),
     ("fissure", "fissure", [200, 150, 210]),
     ("bulla", "bulla", [225, 190, 235]),
-    ("throw", "throw not free", [240, 196, 70]),
+    ("throw", "throw blocked", [240, 196, 70]),
     ("no_skin", "no skin", [245, 245, 245]),
 ];
 
-/// Colours of free directions: the least odds, and those of twice the least and more.
+/// Colours of admissible directions: the lowest odds, and twice the lowest or more.
 const FREE: [Rgb; 2] = [[0, 96, 70], [170, 226, 205]];
 
 /// Colours of an entry map, for pages that draw their own.
@@ -34,7 +32,7 @@ const FREE: [Rgb; 2] = [[0, 96, 70], [170, 226, 205]];
 pub struct RouteColours {
     /// By the name of a rule: in words, red, green, blue.
     pub rules: BTreeMap<&'static str, (&'static str, Rgb)>,
-    /// Free directions: of the least odds, and of twice the least and more.
+    /// Admissible directions: of the lowest odds, and of twice the lowest or more.
     pub free: [Rgb; 2],
 }
 
@@ -49,14 +47,14 @@ pub fn route_colours() -> RouteColours {
     }
 }
 
-/// Routes that are numbered.
+/// Needle paths that are numbered.
 const NUMBERED: usize = 8;
 
 /// The map of a plan; none if it has none.
 pub(crate) fn routes_chart(scenario: &str, plan: &RoutePlan) -> Option<Chart> {
     const SIZE: [f64; 2] = [1000.0, 600.0];
     let map = plan.map.as_ref()?;
-    let title = format!("{scenario}, {}: routes to the target", plan.goal);
+    let title = format!("{scenario}, {}: needle paths to the target", plan.goal);
     let mut chart = Chart::new(SIZE, &*title);
     chart.write_large([20.0, 24.0], title);
     let panel = skin_panel();
@@ -99,20 +97,21 @@ pub(crate) fn routes_chart(scenario: &str, plan: &RoutePlan) -> Option<Chart> {
         }
     }
     let chosen = chosen.map_or_else(
-        || "none is served as wanted".to_owned(),
-        |route| format!("{} is chosen", route + 1),
+        || "none is feasible as required".to_owned(),
+        |route| format!("{} is selected", route + 1),
     );
     chart.write(
         Anchor::Start,
         [80.0, 486.0],
         format!(
-            "numbers: routes, the best first; {chosen}; {} of {} directions are free before the robot is asked",
+            "numbers: needle paths, best first; {chosen}; {} of {} directions admissible before \
+             the robot check",
             plan.free, plan.tried
         ),
     );
     let free = [
-        (FREE[0], "free, least odds"),
-        (FREE[1], "free, twice the odds or more"),
+        (FREE[0], "admissible, lowest odds"),
+        (FREE[1], "admissible, twice the odds or more"),
     ];
     let free = free.map(|(rgb, name)| (Sample::Area(Paint::Fixed(rgb)), name));
     let rules = RULES.iter().zip(seen).filter(|(_, seen)| *seen);

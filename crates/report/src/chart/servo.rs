@@ -2,12 +2,7 @@
 
 use needlebench_bench::servo::experiment::{Course, JointResponse, SMALL_RAD, steps_shown};
 use needlebench_bench::servo::{JointReport, ServoReport};
-
-use super::axis::Axis;
-use super::drawing::{Anchor, Chart};
-use super::legend::{Sample, legend};
-use super::paint::{Overlay, Paint, Stroke};
-use super::panel::Panel;
+use needlebench_show::chart::{Anchor, Axis, Chart, Overlay, Paint, Panel, Sample, Stroke, legend};
 
 /// The engines take the first colours of the series; these come from its end.
 const LINEAR: Stroke = Stroke {
@@ -39,14 +34,14 @@ const COLUMN_PX: f64 = 450.0;
 const PANEL_PX: [f64; 2] = [350.0, 230.0];
 const LEFT_PX: f64 = 84.0;
 const TOP_PX: f64 = 122.0;
-const ROW_PX: f64 = 318.0;
+const LEGEND_ROW_PX: f64 = 318.0;
 
 /// The chart of one joint.
 pub(crate) fn servo_chart(report: &ServoReport, joint: &JointReport) -> Chart {
     let title = format!("{}: servo of {}", joint.joint, report.scenario);
     let size = [
         COLUMNS as f64 * COLUMN_PX + 16.0,
-        TOP_PX + 2.0 * ROW_PX - 20.0,
+        TOP_PX + 2.0 * LEGEND_ROW_PX - 20.0,
     ];
     let mut chart = Chart::new(size, &*title);
     let closed = &joint.closed_loop;
@@ -55,7 +50,8 @@ pub(crate) fn servo_chart(report: &ServoReport, joint: &JointReport) -> Chart {
         Anchor::Start,
         [20.0, 50.0],
         format!(
-            "inertia {:.3} kg m\u{b2}, natural {:.2} Hz, damping {:.2}, torque limit {:.0} N m",
+            "inertia {:.3} kg m\u{b2}, natural frequency {:.2} Hz, damping ratio {:.2}, torque \
+             limit {:.0} N m",
             closed.inertia_kgm2, closed.natural_frequency_hz, closed.damping_ratio, joint.limit_nm
         ),
     );
@@ -140,7 +136,7 @@ impl Drawing<'_> {
             (Sample::Line(LINEAR), "linear loop"),
             (Sample::Line(FED), "with feed-forward"),
             (Sample::Line(LIMIT), "torque limit"),
-            (Sample::Disc(CUT_RADIUS, CUT), "cut by the limit"),
+            (Sample::Disc(CUT_RADIUS, CUT), "torque saturated"),
         ]);
         let width = chart.size[0] - 40.0;
         legend(chart, [20.0, 76.0], width, entries);
@@ -303,7 +299,7 @@ fn panel(column: usize, row: usize, title: &str, x: Axis, y: Axis) -> Panel {
     Panel {
         corner: [
             LEFT_PX + column as f64 * COLUMN_PX,
-            TOP_PX + row as f64 * ROW_PX,
+            TOP_PX + row as f64 * LEGEND_ROW_PX,
         ],
         size: PANEL_PX,
         title: title.to_owned(),
@@ -317,7 +313,6 @@ mod tests {
     use needlebench_bench::servo::experiment::{FrequencyPoint, StepFigures};
     use needlebench_bench::servo::linear::{JointLoop, Margins};
 
-    use super::super::drawing::tests::assert_legible;
     use super::*;
 
     const TIMESTEP_S: f64 = 1e-3;
@@ -397,7 +392,7 @@ mod tests {
             linear_curve: vec![[1.0, 1.0, 0.0], [100.0, 0.1, -2.0]],
         };
         let chart = servo_chart(&report, &joint);
-        assert_legible(&chart);
+        assert_eq!(chart.illegible(), None);
         let svg = chart.to_svg();
         for (index, response) in joint.responses.iter().enumerate() {
             assert!(svg.contains(&format!(">{}</text>", response.engine)));
@@ -412,6 +407,6 @@ mod tests {
             );
         }
         joint.responses.clear();
-        assert_legible(&servo_chart(&report, &joint));
+        assert_eq!(servo_chart(&report, &joint).illegible(), None);
     }
 }

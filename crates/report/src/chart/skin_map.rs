@@ -1,9 +1,6 @@
 //! Maps of the skin as a target sees it.
 
-use super::axis::Axis;
-use super::drawing::{Anchor, Chart};
-use super::paint::{Paint, Stroke};
-use super::panel::Panel;
+use needlebench_show::chart::{Anchor, Axis, Chart, Paint, Panel, Stroke};
 
 /// Elevations beyond this are along the body: no needle goes there, deg.
 pub(super) const HIGHEST_DEG: f64 = 75.0;
@@ -37,7 +34,7 @@ pub(super) fn skin_panel() -> Panel {
         title: String::new(),
         x: Axis::linear("azimuth from the target (deg)", -180.0, 180.0)
             .with_ticks(azimuths.map(named).to_vec()),
-        y: Axis::linear("elevation (deg): up is the head", -HIGHEST_DEG, HIGHEST_DEG),
+        y: Axis::linear("elevation (deg), head upwards", -HIGHEST_DEG, HIGHEST_DEG),
     }
 }
 

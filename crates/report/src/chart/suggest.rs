@@ -1,13 +1,11 @@
 //! Proposals as maps: the skin as the target sees it, and the room from above.
 
 use needlebench_bench::suggest::{EntryRule, EntrySearch, PlaceSearch};
-use needlebench_cell::ResolvedScenario;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_show::chart::{
+    Anchor, Axis, Chart, Paint, Panel, Rgb, Sample, Stroke, legend, mixed,
+};
 
-use super::axis::Axis;
-use super::drawing::{Anchor, Chart};
-use super::legend::{Sample, legend};
-use super::paint::{Paint, Rgb, Stroke, mixed};
-use super::panel::Panel;
 use super::skin_map::{HIGHEST_DEG, MARK_PX, numbered, skin_panel};
 
 /// Colours of rules, told apart by lightness too.
@@ -26,10 +24,10 @@ const ALLOWED: Rgb = [0, 158, 115];
 /// Half a step of the grid of directions, deg.
 const HALF_DEG: f64 = 1.5;
 
-/// The skin as the target sees it: which directions are allowed, and what refuses the others.
+/// The skin seen from the target: admissible directions, and why the others are rejected.
 pub(crate) fn entries_chart(scenario: &str, found: &EntrySearch) -> Chart {
     const SIZE: [f64; 2] = [1000.0, 580.0];
-    let title = format!("{scenario}, {}: where a needle may enter", found.goal);
+    let title = format!("{scenario}, {}: admissible needle entries", found.goal);
     let mut chart = Chart::new(SIZE, &*title);
     chart.write_large([20.0, 24.0], title);
     let panel = skin_panel();
@@ -52,12 +50,12 @@ pub(crate) fn entries_chart(scenario: &str, found: &EntrySearch) -> Chart {
     let occurs = |rule: EntryRule| found.samples.iter().any(|each| each.refused == Some(rule));
     let rules = RULES.iter().filter(|(rule, _)| occurs(*rule));
     let rules = rules.map(|(rule, rgb)| (Sample::Area(Paint::Fixed(*rgb)), rule.in_words()));
-    let entries = std::iter::once((Sample::Area(Paint::Fixed(ALLOWED)), "allowed"));
+    let entries = std::iter::once((Sample::Area(Paint::Fixed(ALLOWED)), "admissible"));
     chart.write(
         Anchor::Start,
         [80.0, 486.0],
         format!(
-            "numbers: proposals, the best first; {} of {} directions are allowed ({})",
+            "numbers: proposals, best first; {} of {} directions admissible ({})",
             found.allowed, found.tried, found.basis
         ),
     );
@@ -73,13 +71,13 @@ fn colour(refused: Option<EntryRule>) -> Rgb {
     found.map_or(ALLOWED, |(_, rgb)| *rgb)
 }
 
-/// The room from above: at how many configurations the worst goal is, at the best height of each place.
+/// The room from above: number of feasible configurations of the worst goal, at the best height of each placement.
 pub(crate) fn places_chart(resolved: &ResolvedScenario, found: &PlaceSearch) -> Chart {
     const SIZE: [f64; 2] = [1000.0, 760.0];
     /// Edge of a place's square, px.
     const EDGE_PX: f64 = 18.0;
     let title = format!(
-        "{}: configurations that work, by place of the base",
+        "{}: feasible configurations by base placement",
         resolved.scenario.name
     );
     let mut chart = Chart::new(SIZE, &*title);
@@ -126,7 +124,7 @@ pub(crate) fn places_chart(resolved: &ResolvedScenario, found: &PlaceSearch) -> 
         Anchor::Start,
         [90.0, 672.0],
         format!(
-            "numbers: proposals, the best first; a square: the best of its heights, the goal with fewest ({})",
+            "numbers: proposals, best first; square: worst goal at the best height ({})",
             found.basis
         ),
     );
@@ -138,12 +136,12 @@ pub(crate) fn places_chart(resolved: &ResolvedScenario, found: &PlaceSearch) -> 
             name.as_str(),
         )
     });
-    chart.write(Anchor::Start, [90.0, 704.0], "of 8 work:");
-    legend(&mut chart, [180.0, 704.0], 780.0, counts);
+    chart.write(Anchor::Start, [90.0, 704.0], "feasible of 8:");
+    legend(&mut chart, [220.0, 704.0], 740.0, counts);
     chart.write(
         Anchor::Start,
         [90.0, 734.0],
-        "a stroke: the base cannot stand there",
+        "stroke: invalid base placement",
     );
     chart
 }
@@ -240,9 +238,8 @@ mod tests {
     use needlebench_bench::Control;
     use needlebench_bench::progress::Silent;
     use needlebench_bench::suggest::{suggest_entries, suggest_places};
-    use needlebench_cell::{Overrides, ScenarioFamily};
+    use needlebench_scenario::{Overrides, ScenarioFamily};
 
-    use super::super::drawing::tests::assert_legible;
     use super::*;
 
     #[test]
@@ -258,11 +255,11 @@ mod tests {
         let found = suggest_entries(base, &base.scenario.goals[0], 3, &control).unwrap();
         assert_eq!(found.entries.len(), 3);
         let chart = entries_chart("supine_suite", &found);
-        assert_legible(&chart);
+        assert_eq!(chart.illegible(), None);
         let goals = [base.goals[0].name.clone()];
         let found = suggest_places(&family, &goals, 3, &control).unwrap();
         let chart = places_chart(base, &found);
-        assert_legible(&chart);
+        assert_eq!(chart.illegible(), None);
         for number in 1..=found.places.len() {
             assert!(chart.texts().any(|text| text.text == number.to_string()));
         }

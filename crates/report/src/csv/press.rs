@@ -1,11 +1,11 @@
-//! The recording of a contact that was asked for.
+//! The recording of a prescribed contact.
 
 use std::fmt::Write;
 
-use needlebench_cell::Goal;
 use needlebench_engine::Recording;
 use needlebench_kinematics::JOINT_LABELS;
 use needlebench_planning::PressPlan;
+use needlebench_scenario::Goal;
 
 /// Signed distance of the bodies that are to touch, m.
 pub(crate) fn clearance_m(press: &PressPlan, recording: &Recording, index: usize) -> Option<f64> {

@@ -1,15 +1,15 @@
-//! Files of an atlas.
+//! Files of a roll map.
 
 use needlebench_bench::GoalAtlas;
 use needlebench_bench::atlas::AtlasReport;
-use needlebench_cell::{Goal, ResolvedScenario};
+use needlebench_scenario::{Goal, ResolvedScenario};
 
 use super::error::FilesError;
 use super::folder::Folder;
 use crate::chart::atlas::atlas_chart;
 use crate::page::atlas_page;
 
-/// Writes the report, the page if it is wanted, and a chart of each goal if they are.
+/// Writes the report, the page if requested, and a chart of each goal if requested.
 pub fn write_atlas(
     resolved: &ResolvedScenario,
     atlases: &[(&Goal, GoalAtlas)],

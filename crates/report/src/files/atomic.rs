@@ -5,7 +5,7 @@ use std::path::Path;
 
 use needlebench_imaging::write::stream;
 
-/// Writes a file beside its place first and then renames it, so that nobody ever sees half of it.
+/// Writes a file beside its place first and then renames it, so that a partial file is never visible.
 /// Who may read it is decided by the user's mask, as of any file.
 ///
 /// It is not made to outlive a power failure: a run is made again. What a study has computed in days

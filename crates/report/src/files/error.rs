@@ -20,7 +20,7 @@ pub enum FilesError {
         source: io::Error,
     },
     /// A file of an earlier run cannot be removed.
-    #[error("cannot remove {} of an earlier run: {source}", path.display())]
+    #[error("cannot remove {} from an earlier run: {source}", path.display())]
     Remove {
         /// Which.
         path: PathBuf,
@@ -43,7 +43,7 @@ pub enum FilesError {
     #[error("robustness: {0}")]
     Robustness(String),
     /// A static case of a study cannot be planned.
-    #[error("planning some cases: {0}")]
+    #[error("planning a sample of cases: {0}")]
     Replan(String),
     /// A recording cannot be exported.
     #[error(transparent)]

@@ -1,12 +1,12 @@
-//! Files of a run that excites every joint, and of its plan.
+//! Files of an excitation run, and of its plan.
 
 use needlebench_bench::record_plan::PlanReport;
 use needlebench_bench::{ExcitationRun, RtdeLog};
+use needlebench_show::layout;
 
 use super::error::FilesError;
 use super::folder::Folder;
 use crate::csv::rtde_csv;
-use crate::layout;
 use crate::table::excitation::clearances_text;
 
 /// Writes the log of each engine and payload; gives the names of the files.

@@ -3,12 +3,12 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use needlebench_render::Image;
+use needlebench_show::chart::Chart;
 use serde::Serialize;
 
 use super::atomic::{stream_atomically, write_atomically};
 use super::error::FilesError;
-use crate::chart::Chart;
-use needlebench_render::Image;
 
 /// Files of charts: pixels for viewers and documents, vectors for papers and pages.
 const CHARTS: [&str; 2] = ["png", "svg"];
@@ -68,7 +68,7 @@ impl Folder<'_> {
         Ok([png, svg])
     }
 
-    /// Removes a file of an earlier run, if there is one: nobody should take it for one of this.
+    /// Removes a file of an earlier run, if there is one, so that it is not taken for one of this run.
     pub fn remove(self, name: &str) -> Result<(), FilesError> {
         let path = self.path(name);
         match std::fs::remove_file(&path) {

@@ -1,9 +1,8 @@
 //! Files of a test by ISO 9283.
 
 use needlebench_bench::ProtocolRun;
-use needlebench_evaluation::iso9283::{
-    Attained, Iso9283Report, ProtocolStatistics, write_commanded, write_log,
-};
+use needlebench_evaluation::iso9283::Iso9283Report;
+use needlebench_iso9283::{Attained, ProtocolStatistics, write_commanded, write_log};
 
 use super::error::FilesError;
 use super::folder::Folder;
@@ -18,7 +17,8 @@ pub(crate) fn write_test(
     folder: Folder<'_>,
     pictures: bool,
 ) -> Result<Vec<String>, FilesError> {
-    let what = "of the measured point in the robot's base frame; quaternion base_from_guide";
+    let what =
+        "of the measured point in the robot's base frame; orientation: quaternion base_from_guide";
     let title = format!("needlebench: commanded poses of {scenario}\nPositions (mm) {what}");
     let name = "commanded.csv".to_owned();
     folder.write(&name, write_commanded(&title, &run.commanded))?;
@@ -26,8 +26,8 @@ pub(crate) fn write_test(
     for (engine, attained, _) in &run.engines {
         let title = format!(
             "needlebench: attained poses of {scenario}, simulated by {engine}\nPositions (mm) {what}\n\
-             direction: axis of the base frame along which the pose was approached; empty in the \
-             plain sequence P5 P4 P3 P2 P1"
+             direction: base-frame axis along which the pose was approached; empty in the plain \
+             sequence P5 P4 P3 P2 P1"
         );
         let name = format!("attained.{engine}.csv");
         folder.write(&name, write_log(&title, attained))?;

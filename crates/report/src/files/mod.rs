@@ -1,7 +1,7 @@
 //! What commands write into their folders of results.
 //!
 //! Charts and pictures are drawn here and not before: they are large, and soon on the disk. Nothing
-//! of an earlier run stays that somebody could take for a result of this one.
+//! of an earlier run stays that could be taken for a result of this one.
 
 mod accuracy;
 mod atlas;

@@ -1,9 +1,10 @@
 //! Pictures and charts of a run's goals.
 
-use needlebench_cell::ResolvedScenario;
 use needlebench_evaluation::report::GoalReport;
 use needlebench_evaluation::room::RoomModel;
 use needlebench_parallel::in_parallel;
+use needlebench_render::{Image, tile};
+use needlebench_scenario::ResolvedScenario;
 
 use super::error::FilesError;
 use super::folder::Folder;
@@ -11,9 +12,8 @@ use crate::chart::budget::budget_chart;
 use crate::chart::ranking::ranking_chart;
 use crate::picture::configuration::{Backdrop, configuration_picture, goal_camera, sheet_caption};
 use crate::picture::room::{RoomPictures, room_caption};
-use needlebench_render::{Image, tile};
 
-/// What is added to the names of pictures: those of the posture, those of the room.
+/// What is added to the names of pictures: those of the posture, those of the free space.
 const KINDS: [&str; 2] = ["", ".room"];
 /// What is added to the names of charts.
 const CHARTS: [&str; 2] = [".ranking", ".budget"];

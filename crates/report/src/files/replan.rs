@@ -6,8 +6,8 @@ use std::sync::atomic::AtomicBool;
 
 use needlebench_bench::progress::Progress;
 use needlebench_bench::study::{PreparedStudy, ReplanControl, Replanned, replan_draw, replanned};
-use needlebench_cell::sha256_hex;
-use needlebench_cell::study::StudyMode;
+use needlebench_input::sha256_hex;
+use needlebench_scenario::study::StudyMode;
 use needlebench_study::ParquetResults;
 use needlebench_study::statistics::Summary;
 

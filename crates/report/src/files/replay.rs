@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use needlebench_bench::replay::{ArmFiles, Course, Replay};
 use needlebench_kinematics::JOINT_COUNT;
+use needlebench_show::layout;
 
 use super::error::FilesError;
 use super::folder::Folder;
 use crate::chart::replay::replay_chart;
 use crate::junit::replay_junit;
-use crate::layout;
 use crate::page::replay_page;
 use crate::table::replay::text;
 

@@ -1,4 +1,4 @@
-//! Files of planned routes.
+//! Files of planned needle paths.
 
 use needlebench_bench::routes::RoutePlan;
 

@@ -5,10 +5,11 @@ use std::time::Instant;
 
 use needlebench_bench::progress::Progress;
 use needlebench_bench::{EngineRun, EventRun, ScenarioRun};
-use needlebench_cell::ResolvedScenario;
 use needlebench_engine::Engine;
+use needlebench_evaluation::report::Report;
 use needlebench_export::{Motion, mcap};
 use needlebench_planning::GoalPlan;
+use needlebench_scenario::ResolvedScenario;
 
 use super::accuracy::remove_accuracy;
 use super::error::FilesError;
@@ -34,9 +35,9 @@ pub struct RunFiles<'a> {
     pub pictures: bool,
     /// The page.
     pub page: bool,
-    /// Threads that draw.
+    /// Threads that render.
     pub jobs: usize,
-    /// Drawing is not begun once this is set: somebody asked to stop.
+    /// Rendering is not begun once this is set by a request to stop.
     pub cancel: &'a AtomicBool,
     /// Engines that there are, with their titles.
     pub engines: &'a [&'static dyn Engine],
@@ -45,14 +46,18 @@ pub struct RunFiles<'a> {
 /// Names of files, by goal and configuration.
 type Names = Vec<Vec<Vec<String>>>;
 
-/// Writes everything that a run leaves, and the names of the files into its report.
+/// Writes everything that a run leaves; gives its report as it stands in the folder: with the names of the files, and
+/// how long they took.
+///
+/// # Errors
+/// [`FilesError`]. What was written until then stays.
 pub fn write_run(
     resolved: &ResolvedScenario,
-    finished: &mut ScenarioRun,
+    finished: &ScenarioRun,
     folder: Folder<'_>,
     wanted: RunFiles<'_>,
     progress: &dyn Progress,
-) -> Result<(), FilesError> {
+) -> Result<Report, FilesError> {
     let started = Instant::now();
     remove_accuracy(folder)?;
     let pictures = resolved.scenario.recording.pictures && wanted.pictures;
@@ -81,30 +86,31 @@ pub fn write_run(
     for (goal, names) in resolved.goals.iter().zip(&names) {
         folder.remove_others(&goal.name, &names.concat())?;
     }
-    for (goal, names) in finished.report.goals.iter_mut().zip(names) {
+    let mut report = finished.report.clone();
+    for (goal, names) in report.goals.iter_mut().zip(names) {
         for (configuration, names) in goal.configurations.iter_mut().zip(names) {
             configuration.files = names;
         }
     }
-    if let (Some(run), Some(report)) = (&finished.iso9283, &mut finished.report.iso9283) {
+    if let (Some(run), Some(test)) = (&finished.iso9283, &mut report.iso9283) {
         let name = &resolved.scenario.name;
-        report.files = write_test(name, report, run, folder, pictures)?;
+        test.files = write_test(name, test, run, folder, pictures)?;
     }
-    if let (Some(run), Some(report)) = (&finished.excitation, &mut finished.report.excitation) {
-        report.files = write_logs(run, folder)?;
+    if let (Some(run), Some(test)) = (&finished.excitation, &mut report.excitation) {
+        test.files = write_logs(run, folder)?;
     }
     if wanted.page {
         progress.message("writing the page");
-        folder.write("report.html", run_page(resolved, finished))?;
+        folder.write("report.html", run_page(resolved, finished, &report))?;
     } else {
         folder.remove("report.html")?;
     }
-    let report = &mut finished.report;
     let writing_s = started.elapsed().as_secs_f64();
     report.timings.insert("writing_s".to_owned(), writing_s);
-    folder.write_json("report.json", report)?;
-    folder.write("junit.xml", junit(&[report])?)?;
-    folder.write("summary.md", markdown(report, wanted.engines))
+    folder.write_json("report.json", &report)?;
+    folder.write("junit.xml", junit(&[&report])?)?;
+    folder.write("summary.md", markdown(&report, wanted.engines))?;
+    Ok(report)
 }
 
 /// Recordings of all motions, those that ended early among them.
@@ -203,7 +209,7 @@ fn write_mcap(
     Ok(())
 }
 
-/// Recordings of the contacts that were asked for, and a chart of each.
+/// Recordings of the prescribed contacts, and a chart of each.
 fn write_events(
     resolved: &ResolvedScenario,
     run: &EventRun,

@@ -30,11 +30,11 @@ pub struct SearchDocument<'a> {
     study_id: &'a str,
     /// Cases are final postures: whether a motion gets there is not known.
     postures_only: bool,
-    /// Classes of clearance whose room counts in margins.
+    /// Classes of clearance that count in margins.
     classes: Vec<&'static str>,
-    /// Cases of all choices with all layouts; none of choices with ranges.
+    /// Cases of an exhaustive grid of candidates and layouts; none with ranges.
     grid_cases: Option<u64>,
-    /// Number of the candidate to choose; none before the end, and where the best one works in no layout.
+    /// Number of the recommended candidate; none before the end, and where the best one is feasible in no layout.
     recommended: Option<usize>,
     #[serde(flatten)]
     log: &'a SearchLog,

@@ -4,11 +4,13 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use needlebench_bench::progress::Progress;
 use needlebench_bench::study::{
     ENGINE_FAILURE, PreparedStudy, Replanned, RobustnessResult, StudyCase, robustness_of,
 };
-use needlebench_cell::requirements::{Requirements, requirement_of};
 use needlebench_evaluation::report::Verdict;
+use needlebench_scenario::requirements::{Requirements, requirement_of};
+use needlebench_show::blocks_text;
 use needlebench_study::statistics::{
     CriterionResult, Summary, SummaryOptions, judge_study, summarise,
 };
@@ -23,14 +25,12 @@ use super::replan::replan;
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
 use crate::page::study::{CasePictures, StudyPage};
-use crate::table::blocks_text;
 use crate::table::study::answer::Answer;
 use crate::table::study::criteria::requirements_blocks;
 use crate::table::study::document::{Document, Parts};
 use crate::table::study::postures::{Postures, RouteLeftOut, postures_blocks, postures_headline};
 use crate::table::study::robustness::{robustness_blocks, robustness_method};
 use crate::table::verdict::capitals;
-use needlebench_bench::progress::Progress;
 
 /// Name of the page in a study's folder.
 const PAGE_FILE: &str = "report.html";
@@ -40,7 +40,7 @@ const PAGE_FILE: &str = "report.html";
 pub struct StudySummary {
     /// Name of the study.
     name: String,
-    /// The question that it answers.
+    /// The question of the study.
     description: String,
     /// Hash of everything that decides the results.
     study_id: String,
@@ -48,26 +48,25 @@ pub struct StudySummary {
     cases: u64,
     /// What is computed of a case, unless a level of a factor says otherwise.
     mode: &'static str,
-    /// Whether all cases, some of them or none are of postures only: whether a motion gets there is then
-    /// not known.
+    /// Whether all cases, some of them or none are postures only, without planned motions.
     postures_only: &'static str,
-    /// Whether the needle's route is no part of what works.
+    /// Whether feasibility leaves out the needle path.
     without_route: bool,
-    /// Postures only, and the needle's route left out, in sentences; none where all cases have both.
+    /// Caveats: postures only, needle path not checked; none where all cases have both.
     #[serde(skip_serializing_if = "Option::is_none")]
     headline: Option<String>,
-    /// The answer, in a sentence with its figure and interval, and what it compares.
+    /// The answer: a sentence with its value and confidence interval, remarks and comparisons.
     answer: Answer,
-    /// How much the postures alone overstate; none where all cases have motions, or none was to be planned.
+    /// Overestimate of postures only; none where all cases have motions, or none was to be planned.
     #[serde(skip_serializing_if = "Option::is_none")]
     replanned: Option<Replanned>,
     /// `pass`, `fail` or `incomplete`.
     verdict: Verdict,
     /// Criteria of the study.
     criteria: Vec<CriterionResult>,
-    /// What was to be judged and could not be, and why.
+    /// Criteria and motions that could not be evaluated, and why.
     not_judged: Vec<String>,
-    /// How far the base scenario's phantom may move; none unless the study asks for it.
+    /// How far the base scenario's phantom may move; none without `[robustness]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     robustness: Option<Vec<RobustnessResult>>,
     /// Statistics.
@@ -96,13 +95,12 @@ pub struct FinishedStudy {
     /// Its statistics.
     pub summary: StudySummary,
     document: Document,
-    /// Whether all criteria are judged and met.
+    /// Whether all criteria are evaluated and met.
     pub verdict: Verdict,
 }
 
 impl FinishedStudy {
-    /// The summary for a terminal: verdict, answer and the tables that it rests on, or `all` that there is, the
-    /// first screen last.
+    /// The summary for a terminal: verdict, answer and the tables behind it, or `all` tables, the first screen last.
     pub fn text(&self, all: bool) -> String {
         let mut text = String::new();
         if all {
@@ -245,8 +243,7 @@ pub fn write_study(
     })
 }
 
-/// What was to be judged and could not be: criteria without values, and motions that engines could not
-/// carry out, of which nothing is measured.
+/// What could not be evaluated: criteria without values, and motions that engines could not execute.
 fn not_judged(statistics: &Summary, criteria: &[CriterionResult]) -> Vec<String> {
     let open = criteria.iter().filter(|each| !each.is_judged());
     let mut reasons: Vec<String> = open
@@ -264,15 +261,15 @@ fn not_judged(statistics: &Summary, criteria: &[CriterionResult]) -> Vec<String>
         .partition(|(detail, _)| detail.starts_with(ENGINE_FAILURE));
     reasons.extend(failures.into_iter().map(|(detail, count)| {
         let engine = detail.trim_start_matches(ENGINE_FAILURE).trim();
-        format!("{engine} could not carry out {count} motions, of which nothing is measured")
+        format!("{engine} could not execute {count} motions (no measurements)")
     }));
     reasons.extend(criteria.into_iter().map(|(criterion, count)| {
-        format!("{criterion} of the scenario could not be judged of {count} configurations")
+        format!("scenario criterion {criterion} not evaluated for {count} configurations")
     }));
     reasons
 }
 
-/// Whether there is anything to judge.
+/// Whether there is anything to evaluate.
 fn is_judged(summary: &StudySummary) -> bool {
     !summary.criteria.is_empty() || !summary.not_judged.is_empty()
 }
@@ -312,7 +309,7 @@ fn verdict_line(summary: &StudySummary) -> String {
     let met = summary.criteria.iter().filter(|each| each.pass).count();
     let open = [
         (summary.postures_only == "all").then_some("postures only"),
-        summary.without_route.then_some("needle route left out"),
+        summary.without_route.then_some("needle path not checked"),
     ];
     let open: Vec<&str> = open.into_iter().flatten().collect();
     let open = if open.is_empty() {
@@ -323,19 +320,21 @@ fn verdict_line(summary: &StudySummary) -> String {
     let name = format!("{}, {} cases{open}", summary.name, summary.cases);
     let verdict = capitals(summary.verdict);
     if !is_judged(summary) {
-        return format!("{name}: no verdict, the study has no criteria of its own");
+        return format!("{name}: no verdict, no study criteria defined");
     }
     if summary.not_judged.is_empty() {
         return format!("{name}: {verdict}: {met} of {total} criteria met");
     }
     let why = summary.not_judged.join("; ");
     if total == 0 {
-        return format!("{name}: {verdict}: not judged: {why}");
+        return format!("{name}: {verdict}: not evaluated: {why}");
     }
     let met = if met == judged {
         "all met".to_owned()
     } else {
         format!("{met} of them met")
     };
-    format!("{name}: {verdict}: {judged} of {total} criteria judged, {met}; not judged: {why}")
+    format!(
+        "{name}: {verdict}: {judged} of {total} criteria evaluated, {met}; not evaluated: {why}"
+    )
 }

@@ -1,7 +1,7 @@
 //! Files of proposals.
 
 use needlebench_bench::suggest::{EntrySearch, PlaceSearch};
-use needlebench_cell::ResolvedScenario;
+use needlebench_scenario::ResolvedScenario;
 
 use super::error::FilesError;
 use super::folder::Folder;

@@ -47,7 +47,7 @@ pub fn comparison_junit(
                 })
                 .collect();
             of_it.set_system_out(if lines.is_empty() {
-                "nothing changed".to_owned()
+                "no changes".to_owned()
             } else {
                 lines.join("\n")
             });

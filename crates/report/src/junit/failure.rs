@@ -1,4 +1,4 @@
-//! A case that failed, and one that could not be judged.
+//! A case that failed, and one that could not be evaluated.
 
 use quick_junit::{NonSuccessKind, TestCaseStatus};
 
@@ -9,9 +9,9 @@ pub(super) fn failure(reason: &str) -> TestCaseStatus {
     status
 }
 
-/// Not judged, and why: JUnit's `error`, which no reader takes for passed.
+/// Not evaluated, and why: JUnit's `error`, which no reader counts as passed.
 pub(super) fn not_judged(reason: &str) -> TestCaseStatus {
     let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
-    status.set_message(format!("not judged: {reason}"));
+    status.set_message(format!("not evaluated: {reason}"));
     status
 }

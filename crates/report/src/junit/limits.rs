@@ -7,7 +7,7 @@ use quick_junit::{SerializeError, TestCase, TestCaseStatus, TestSuite};
 use super::failure::{failure, not_judged};
 use super::times::share_time;
 
-/// A limit and what it was held against.
+/// A limit and the value compared with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JudgedLimit {
     /// Its name.
@@ -16,7 +16,7 @@ pub struct JudgedLimit {
     pub value: Option<String>,
     /// The limit with its unit.
     pub limit: String,
-    /// Whether it is kept.
+    /// Whether it is satisfied.
     pub pass: bool,
 }
 

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use needlebench_bench::replay::{ReplayReport, SUBJECT};
+use needlebench_show::number::value_and_limit;
 use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::failure::{failure, not_judged};
 use super::run::REQUIREMENT;
 use super::times::share_time;
-use crate::number::value_and_limit;
 
 /// A replay as a JUnit document. Of two replays its times alone differ: `elapsed`,
 /// shared evenly among its cases.

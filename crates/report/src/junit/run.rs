@@ -6,17 +6,17 @@ use std::time::Duration;
 use needlebench_cell::rule_in_words;
 use needlebench_evaluation::report::{CriterionResult, Report, Status, TraceOutcome};
 use needlebench_evaluation::{excitation, iso9283};
+use needlebench_show::number::value_and_limit;
 use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::failure::{failure, not_judged};
 use super::times::{seconds, share_time};
-use crate::number::value_and_limit;
-use crate::table::verdict::missed_as_expected;
+use crate::table::verdict::{missed_as_expected, qualifying};
 
 /// Reports as one JUnit document. Of two runs of the same inputs its times alone differ: each report's time
 /// of planning and simulation, shared evenly among its cases.
 ///
-/// A rejected configuration counts as skipped unless that contradicts what is expected of it.
+/// A rejected configuration counts as skipped unless that contradicts its expected outcome.
 pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
     let mut document = quick_junit::Report::new("needlebench");
     let mut total = Duration::ZERO;
@@ -30,7 +30,7 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
                     .iter()
                     .filter(|result| result.goal == goal.name && !result.pass)
                     .filter(|result| result.label.as_deref() == Some(configuration.label))
-                    // As the verdict has it; the lines of its values say that it is missed.
+                    // As the verdict has it; the lines of its values say that it failed.
                     .filter(|result| !missed_as_expected(report, result))
                     .map(described)
                     .collect();
@@ -50,7 +50,7 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
                     }
                     status
                 } else if configuration.engines.is_empty() {
-                    failure("no engine measured it")
+                    failure("measured by no engine")
                 } else {
                     TestCaseStatus::success()
                 };
@@ -79,6 +79,9 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
             add_values(&mut case, report, &goal.name, None);
             case.set_classname(format!("{}.{}", report.scenario.name, goal.name));
             suite.add_test_case(case);
+            for note in qualifying(report) {
+                suite.add_property(("note", note));
+            }
             of_report.add_test_suite(suite);
         }
         for (subject, is_there) in [
@@ -139,7 +142,7 @@ fn add_requirements(case: &mut TestCase, report: &Report, goal: &str, label: Opt
     }
 }
 
-/// What was judged of a configuration, or of the goal as a whole: each value with its limit, a line each.
+/// Evaluated criteria of a configuration, or of the goal as a whole: each value with its limit, a line each.
 fn add_values(case: &mut TestCase, report: &Report, goal: &str, label: Option<&str>) {
     let all = report.criteria.iter();
     let of_it = all.filter(|each| each.goal == goal && each.label.as_deref() == label);
@@ -149,13 +152,13 @@ fn add_values(case: &mut TestCase, report: &Report, goal: &str, label: Option<&s
     }
 }
 
-/// `met` or `missed`, and of what.
+/// `met` or `failed`, and of what.
 fn judged(result: &CriterionResult) -> String {
-    let word = if result.pass { "met" } else { "missed" };
+    let word = if result.pass { "met" } else { "failed" };
     format!("{word}: {}", described(result))
 }
 
-/// What was not judged of a configuration, or of the goal as a whole: criteria and why.
+/// Criteria not evaluated of a configuration, or of the goal as a whole, and why.
 fn open(report: &Report, goal: &str, label: Option<&str>) -> String {
     let all = report.not_judged.iter();
     let of_it = all.filter(|each| each.goal == goal && each.label.as_deref() == label);
@@ -165,10 +168,13 @@ fn open(report: &Report, goal: &str, label: Option<&str>) -> String {
     texts.join("; ")
 }
 
-/// A test by ISO 9283, or a run that excites every joint: a case for each criterion.
+/// An ISO 9283 test or an excitation run: a case for each criterion.
 fn suite_of(report: &Report, subject: &str) -> TestSuite {
     let name = format!("{}.{subject}", report.scenario.name);
     let mut suite = TestSuite::new(name.clone());
+    for note in qualifying(report) {
+        suite.add_property(("note", note));
+    }
     for result in report.criteria.iter().filter(|each| each.goal == subject) {
         let status = if result.pass {
             TestCaseStatus::success()

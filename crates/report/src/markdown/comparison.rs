@@ -2,8 +2,8 @@
 
 use needlebench_evaluation::compare::Comparison;
 use needlebench_evaluation::report::Verdict;
+use needlebench_show::markdown::{code, inline, paragraph};
 
-use super::escape::{code, inline, paragraph};
 use crate::table::comparison::{
     failure_text, goal_title, metric_texts, remarks, rows, side_text, unchanged, verdict,
 };
@@ -12,7 +12,7 @@ use crate::table::comparison::{
 pub fn comparison_markdown(comparison: &Comparison) -> String {
     let mut lines = vec![
         format!(
-            "# {} against {}: {}",
+            "# {} compared with {}: {}",
             inline(&comparison.a.source),
             inline(&comparison.b.source),
             match comparison.verdict {
@@ -45,7 +45,10 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
         lines.push(format!("- **incomplete** {}", inline(reason)));
     }
     for failure in &comparison.failures {
-        lines.push(format!("- **lost** {}", inline(&failure_text(failure))));
+        lines.push(format!(
+            "- **regression** {}",
+            inline(&failure_text(failure))
+        ));
     }
     for goal in &comparison.goals {
         lines.push(format!("\n## {}\n", inline(&goal_title(goal))));
@@ -68,7 +71,7 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
             }
         }
         if goal.a.is_some() && goal.b.is_some() {
-            lines.push(format!("\n{} values are the same.", unchanged(goal)));
+            lines.push(format!("\n{} values are unchanged.", unchanged(goal)));
         }
     }
     lines.push(String::new());

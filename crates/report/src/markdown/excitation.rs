@@ -1,18 +1,18 @@
-//! A run that excites every joint as Markdown.
+//! An excitation run as Markdown.
 
 use std::fmt::Write;
 
 use needlebench_evaluation::excitation::{ExcitationReport, proven_m};
 
-/// What a run found, a row for each engine and payload.
+/// Results of a run, a row for each engine and payload.
 pub(crate) fn report_markdown(report: &ExcitationReport) -> String {
     let millimetres =
         |value: Option<f64>| value.map_or("-".to_owned(), |metres| format!("{:.1}", metres * 1e3));
     let [others, itself] = proven_m(&report.planned).map(millimetres);
     let mut text = format!(
-        "Excitation: {} postures, {:.0} s with each payload; proven clearances of the plan {others} mm from \
-         everything else and {itself} mm from itself\n\n\
-         | Engine | Payload (kg) | Clearance (mm) | From itself (mm) | Torque of limit |\n|---|--:|--:|--:|--:|\n",
+        "Excitation: {} postures, {:.0} s with each payload; certified clearance of the plan \
+         {others} mm, self-clearance {itself} mm\n\n| Engine | Payload (kg) | Clearance (mm) | \
+         Self-clearance (mm) | Peak torque ratio |\n|---|--:|--:|--:|--:|\n",
         report.postures_rad.len(),
         report.duration_s
     );

@@ -3,8 +3,7 @@
 use std::fmt::Write;
 
 use needlebench_evaluation::iso9283::Iso9283Report;
-
-use crate::number::{small_length, small_length_or_zero};
+use needlebench_show::number::{small_length, small_length_or_zero};
 
 /// What a run found, a row for each engine and pose.
 pub(crate) fn report_markdown(report: &Iso9283Report) -> String {

@@ -1,4 +1,4 @@
-//! The table of metrics as Markdown for people.
+//! The table of metrics as Markdown.
 
 use std::fmt::Write as _;
 
@@ -6,11 +6,11 @@ use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::metric::{GROUPS, Group, Metric, MetricKey};
 use serde::Serialize;
 
-const INTRODUCTION: &str = "\
-Every number by which configurations are judged, ranked and compared. A name is one thing everywhere: in \
-`report.json` (`configurations[].metrics`, in the unit under Report), in rankings, in columns of studies (in the unit \
-under Study, which ends the column's name), and in `compare`. Names that end in `_static` are of static cases of \
-studies. What was not measured is absent, and never 0.";
+const INTRODUCTION: &str = "All metrics by which configurations are evaluated, ranked and compared. A name has the same \
+     meaning everywhere: in `report.json` (`configurations[].metrics`, in the unit under Report), \
+     in rankings, in columns of studies (in the unit under Study, which ends the column's name), \
+     and in `compare`. Names ending in `_static` belong to static cases of studies. A metric that \
+     was not measured is absent, never 0.";
 
 /// A name of a metric, described.
 #[derive(Debug, Serialize)]
@@ -27,7 +27,7 @@ pub struct MetricDescription {
     pub study_unit: &'static str,
     /// Whether more of it is better; none where neither is.
     pub more_is_better: Option<bool>,
-    /// What exactly it is.
+    /// Its definition.
     pub definition: String,
 }
 
@@ -70,7 +70,7 @@ pub fn metrics_markdown() -> String {
     let mut text = format!("# Metrics\n\n{INTRODUCTION}\n");
     for group in GROUPS {
         let _ = writeln!(text, "\n## {}\n", group.title);
-        text.push_str("| Name | Report | Study | Better | What exactly |\n|---|---|---|---|---|\n");
+        text.push_str("| Name | Report | Study | Better | Definition |\n|---|---|---|---|---|\n");
         for metric in descriptions(group) {
             let better = match metric.more_is_better {
                 Some(true) => "more",

@@ -1,7 +1,6 @@
 //! Markdown, for pull requests and pages of continuous integration.
 
 mod comparison;
-pub(crate) mod escape;
 mod excitation;
 mod iso9283;
 mod metrics;

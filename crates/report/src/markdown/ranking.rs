@@ -36,7 +36,7 @@ pub(super) fn ranking_markdown(goal: &GoalReport) -> String {
     }
     let rows: Vec<String> = lines.iter().map(|line| format!("| {line} |")).collect();
     format!(
-        "{}\n\nScores of 100; in brackets what each metric contributes.\n",
+        "{}\n\nScores of 100; in brackets: contribution of each metric.\n",
         rows.join("\n")
     )
 }

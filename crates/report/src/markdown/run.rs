@@ -2,16 +2,16 @@
 
 use std::fmt::Write;
 
-use needlebench_cell::{pair_in_words, rule_in_words};
+use needlebench_cell::rule_in_words;
 use needlebench_engine::Engine;
 use needlebench_evaluation::report::{GoalReport, Report, Status, TraceOutcome, Verdict};
+use needlebench_show::markdown::{inline, paragraph};
 
-use super::escape::{inline, paragraph};
 use super::ranking::ranking_markdown;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::shown::{Shown, shown_metrics};
 use crate::table::true_target::true_target_in_words;
-use crate::table::verdict::{counts, status};
+use crate::table::verdict::{counts, qualifies, qualifying, status};
 use crate::table::{fissures_in_words, route_in_words, route_wanted_m};
 
 /// The report as Markdown; `engines` are those that there are, with their titles.
@@ -33,6 +33,14 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         writeln!(out, "{}\n", paragraph(&report.scenario.description))?;
     }
     write_judged(out, report)?;
+    let mut is_qualified = false;
+    for note in qualifying(report) {
+        writeln!(out, "- note: {}", inline(note))?;
+        is_qualified = true;
+    }
+    if is_qualified {
+        writeln!(out)?;
+    }
     for goal in &report.goals {
         writeln!(out, "## {}\n", inline(&goal.name))?;
         write_configurations(out, report, goal, engines)?;
@@ -82,9 +90,12 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
                 let reason = inline(&found.reason);
                 let summary = inline(&found.summary);
                 writeln!(out, "Recommended: **{}** - {summary}\n", found.label)?;
-                writeln!(out, "In full: {reason}\n")?;
+                writeln!(out, "Details: {reason}\n")?;
             }
-            None => writeln!(out, "No configuration works.\n")?,
+            None => writeln!(
+                out,
+                "No configuration is feasible and meets the criteria.\n"
+            )?,
         }
     }
     if let Some(iso9283) = &report.iso9283 {
@@ -97,13 +108,14 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         writeln!(out, "\n## Requirements\n")?;
         writeln!(
             out,
-            "| Requirement | Criterion | Outcome | Met | Missed | Not judged |\n|---|---|---|--:|--:|--:|"
+            "| Requirement | Criterion | Outcome | Met | Failed | Not evaluated \
+             |\n|---|---|---|--:|--:|--:|"
         )?;
         for row in &report.trace {
             let outcome = match row.outcome {
                 TraceOutcome::Met => "met",
-                TraceOutcome::Missed => "**missed**",
-                TraceOutcome::NotJudged => "**not judged**",
+                TraceOutcome::Missed => "**failed**",
+                TraceOutcome::NotJudged => "**not evaluated**",
             };
             writeln!(
                 out,
@@ -128,7 +140,8 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     if !report.enclosure.is_empty() {
         writeln!(
             out,
-            "\n| Link | Enclosing primitives off the mesh, mean (mm) | Worst (mm) | Mesh out of the primitives (mm) |\n|---|--:|--:|--:|"
+            "\n| Link | Primitives to mesh, mean (mm) | Maximum (mm) | Mesh protrusion, maximum \
+             (mm) |\n|---|--:|--:|--:|"
         )?;
         for each in &report.enclosure {
             writeln!(
@@ -142,7 +155,7 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         }
         writeln!(out)?;
     }
-    for note in &report.notes {
+    for note in report.notes.iter().filter(|note| !qualifies(note)) {
         writeln!(out, "- note: {}", inline(note))?;
     }
     let provenance = &report.provenance;
@@ -161,7 +174,7 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     )
 }
 
-/// What was met, what was missed and what was not judged.
+/// Criteria met, failed and not evaluated.
 fn write_judged(out: &mut String, report: &Report) -> std::fmt::Result {
     let failed: Vec<_> = report
         .criteria
@@ -184,7 +197,7 @@ fn write_judged(out: &mut String, report: &Report) -> std::fmt::Result {
     for (label, reason, criteria) in not_judged(report) {
         writeln!(
             out,
-            "- not judged: {}: {criteria} ({})",
+            "- not evaluated: {}: {criteria} ({})",
             inline(&label),
             inline(reason)
         )?;
@@ -195,7 +208,7 @@ fn write_judged(out: &mut String, report: &Report) -> std::fmt::Result {
     Ok(())
 }
 
-/// What was not judged: goal and configuration, why, and which criteria, those of one reason together.
+/// What was not evaluated: goal and configuration, why, and which criteria, those of one reason together.
 fn not_judged(report: &Report) -> Vec<(String, &str, String)> {
     let mut found: Vec<(String, &str, String)> = Vec::new();
     for each in &report.not_judged {
@@ -222,18 +235,12 @@ fn write_configurations(
     let columns: Vec<(String, Shown)> = shown_metrics(engines, |heading| heading.summary)
         .filter(|(_, shown)| shown.says_something(goal))
         .collect();
-    let is_least = |shown: &Shown| shown.metric().family == "least_clearance";
     write!(out, "| Configuration | Status |")?;
-    for (heading, shown) in &columns {
-        let between = if is_least(shown) { " Between |" } else { "" };
-        write!(out, " {heading} |{between}")?;
+    for (heading, _) in &columns {
+        write!(out, " {heading} |")?;
     }
     write!(out, "\n|---|---|")?;
-    for (_, shown) in &columns {
-        let between = if is_least(shown) { "---|" } else { "" };
-        write!(out, "--:|{between}")?;
-    }
-    writeln!(out)?;
+    writeln!(out, "{}", "--:|".repeat(columns.len()))?;
     for each in &goal.configurations {
         let status = match (each.status, each.rejections.first()) {
             (Status::Rejected, Some(first)) => format!("rejected: {}", rule_in_words(first.rule)),
@@ -246,12 +253,6 @@ fn write_configurations(
         write!(out, "| {mark}{}{mark} | {status} |", each.label)?;
         for (_, shown) in &columns {
             write!(out, " {} |", shown.text(each))?;
-            if is_least(shown) {
-                let least = each.clearance.least();
-                let pair =
-                    least.map_or("-".to_owned(), |found| inline(&pair_in_words(&found.pair)));
-                write!(out, " {pair} |")?;
-            }
         }
         writeln!(out)?;
     }

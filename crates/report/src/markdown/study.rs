@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use needlebench_evaluation::report::Verdict;
+use needlebench_show::markdown::inline;
+use needlebench_show::{Block, has_words, heading};
 
-use super::escape::inline;
 use crate::table::study::document::Document;
-use crate::table::{Block, has_words, heading};
 
 /// Text that breaks no table.
 fn cell_text(text: &str) -> String {

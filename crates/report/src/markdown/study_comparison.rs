@@ -1,15 +1,15 @@
 //! Two studies side by side.
 
+use needlebench_show::markdown::{inline, paragraph};
 use needlebench_study::compare::StudyComparison;
 
-use super::escape::{inline, paragraph};
 use crate::table::study_comparison::{failure_text, intro, row, shown, verdict as summary_line};
 
 /// The comparison as Markdown, for pull requests: what changed alone.
 pub fn study_comparison_markdown(comparison: &StudyComparison) -> String {
     let verdict = if comparison.pass { "pass" } else { "**fail**" };
     let mut lines = vec![format!(
-        "# {} against {}: {verdict}\n",
+        "# {} compared with {}: {verdict}\n",
         inline(&comparison.a.source),
         inline(&comparison.b.source)
     )];
@@ -20,11 +20,14 @@ pub fn study_comparison_markdown(comparison: &StudyComparison) -> String {
             .map(|line| format!("- {}", inline(&line))),
     );
     for failure in &comparison.failures {
-        lines.push(format!("- **lost** {}", inline(&failure_text(failure))));
+        lines.push(format!(
+            "- **regression** {}",
+            inline(&failure_text(failure))
+        ));
     }
     let rows = shown(comparison, false);
     if !rows.is_empty() {
-        lines.push("\n| What | A | B | B less A | |".to_owned());
+        lines.push("\n| Quantity | A | B | B - A | |".to_owned());
         lines.push("|---|--:|--:|--:|---|".to_owned());
         for change in &rows {
             lines.push(format!(
@@ -34,6 +37,6 @@ pub fn study_comparison_markdown(comparison: &StudyComparison) -> String {
         }
     }
     let same = comparison.changes.len() - rows.len();
-    lines.push(format!("\n{same} rates and quantiles are the same.\n"));
+    lines.push(format!("\n{same} rates and quantiles are unchanged.\n"));
     lines.join("\n")
 }

@@ -3,17 +3,16 @@
 use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Vector3};
-use needlebench_cell::phantom::Tissue;
-use needlebench_cell::{Goal, ResolvedScenario, pair_in_words};
+use needlebench_cell::{Rule, pair_in_words};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
 use needlebench_geometry::Visual;
 use needlebench_kinematics::{Joints, Pose};
-use needlebench_planning::Rule;
+use needlebench_phantom::Tissue;
 use needlebench_render::{
     Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceInstance, render,
 };
-
-use crate::number::{millimetres, small_length};
+use needlebench_scenario::{Goal, ResolvedScenario};
+use needlebench_show::number::{millimetres, small_length};
 
 /// Size of one picture, pixels.
 const SIZE_PX: [u32; 2] = [1000, 750];
@@ -115,10 +114,10 @@ pub(crate) fn configuration_picture(
         text: refused.map_or("target".to_owned(), |rejection| rejection.detail.clone()),
         anchor: Anchor::World(goal.target_m),
     });
-    if let Some(found) = report.clearance.least() {
+    if let Some(found) = report.clearance.least_from_surroundings() {
         scene.labels.push(Label {
             text: format!(
-                "least clearance {} mm\n{}\n({})",
+                "clearance {} mm\n{}\n({})",
                 millimetres(found.minimum_m),
                 pair_in_words(&found.pair),
                 found.phase

@@ -1,17 +1,17 @@
 //! Pictures of what a configuration leaves to people, as the paper's Figure 6: free space shaded,
-//! lines of sight, and the cone for the hand.
+//! lines of sight, and the hand cone.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use needlebench_cell::ResolvedScenario;
-use needlebench_cell::people::Person;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
 use needlebench_evaluation::room::{RoomModel, RoomReport, SECTOR_RADIUS_M, sight_segments};
 use needlebench_geometry::{Shape, TriangleMesh};
 use needlebench_kinematics::{Joints, Pose};
 use needlebench_render::{Anchor, Camera, Image, Label, Line3, Scene, SurfaceInstance, render};
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::people::Person;
 
 use super::configuration::{Backdrop, floor, posture_scene, sheet_caption, viewpoint};
 use super::voxels::voxel_surface;
@@ -94,9 +94,9 @@ impl<'a> RoomPictures<'a> {
             anchor: Anchor::BottomLeft,
         });
         scene.labels.push(Label {
-            text: "green: free space   red: taken by the arm\n\
-                   blue: cone for the hand\n\
-                   lines: sight, free and blocked"
+            text: "green: free space   red: occupied by the arm\n\
+                   blue: hand cone\n\
+                   lines of sight: free and blocked"
                 .to_owned(),
             anchor: Anchor::BottomRight,
         });
@@ -105,7 +105,7 @@ impl<'a> RoomPictures<'a> {
         Some(render(&scene, &self.camera))
     }
 
-    /// The half ball about the entry point, and what the arm takes of it.
+    /// The hemisphere about the entry point, and what the arm occupies of it.
     fn add_space(&self, scene: &mut Scene, q: &Joints) {
         let sector = self.room.sector(self.goal);
         let taken = self.room.taken(self.goal, q);
@@ -272,7 +272,10 @@ fn numbers(room: &RoomReport) -> String {
             .iter()
             .map(|(name, free)| format!("  {name} {:.0} %", 100.0 * free)),
     );
-    lines.push(format!("sight {:.0} %", 100.0 * room.sight_fraction));
+    lines.push(format!(
+        "line of sight {:.0} %",
+        100.0 * room.sight_fraction
+    ));
     let blocker = room
         .hand_cone_blocker
         .as_ref()
@@ -290,7 +293,7 @@ pub(crate) fn room_caption(goal: &GoalReport, report: &ConfigurationReport) -> S
         return sheet_caption(goal, report);
     };
     format!(
-        "{}\nfree {:.0} %, sight {:.0} %, hand cone {:.0} deg",
+        "{}\nfree {:.0} %, line of sight {:.0} %, hand cone {:.0} deg",
         sheet_caption(goal, report),
         100.0 * room.free_fraction,
         100.0 * room.sight_fraction,

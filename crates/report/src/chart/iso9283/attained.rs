@@ -1,13 +1,10 @@
 //! Attained positions about the command.
 
-use needlebench_evaluation::iso9283::{Attained, PoseStatistics, ProtocolStatistics};
-
-use crate::chart::axis::Axis;
-use crate::chart::drawing::{Anchor, Chart, Size};
-use crate::chart::legend::{ROW_PX, Sample, legend};
-use crate::chart::paint::{Paint, Stroke};
-use crate::chart::panel::Panel;
-use crate::number::{LengthUnit, small_length, small_length_or_zero, unit_of_length};
+use needlebench_iso9283::{Attained, PoseStatistics, ProtocolStatistics};
+use needlebench_show::chart::{
+    Anchor, Axis, Chart, LEGEND_ROW_PX, Paint, Panel, Sample, Size, Stroke, legend,
+};
+use needlebench_show::number::{LengthUnit, small_length, small_length_or_zero, unit_of_length};
 
 const PANEL_PX: f64 = 270.0;
 /// From one panel to the next, px.
@@ -60,7 +57,7 @@ pub(crate) fn attained_chart(
     let half = half_m * unit.per_metre;
     let columns = poses.len().max(3) as f64;
     let foot = TOP_PX + 2.0 * STEP_PX + BELOW_PX;
-    let title = format!("{heading}: attained positions about the command");
+    let title = format!("{heading}: attained positions relative to the command");
     let wide = Size::Large.width(&title) + 40.0;
     let size = [(LEFT_PX + columns * STEP_PX).max(wide), foot];
     let mut chart = Chart::new(size, &*title);
@@ -110,7 +107,7 @@ pub(crate) fn attained_chart(
         }
     }
     if statistics.nothing_random {
-        let text = "RP = 0: all measurements of a pose are equal, nothing random is switched on";
+        let text = "RP = 0: all measurements of a pose are bit-identical";
         chart.write(Anchor::Start, [LEFT_PX, foot - 16.0], text);
     }
     chart
@@ -158,20 +155,24 @@ fn key(chart: &mut Chart) {
         (Sample::Line(COMMAND), "cross: command"),
         (Sample::Disc(POINT_RADIUS, POINT), "attained"),
         (Sample::Disc(MEAN_RADIUS, MEAN.paint), "mean"),
-        (Sample::Circle(7.0, MEAN), "AP about the command"),
-        (Sample::Circle(7.0, SPHERE), "RP about the mean"),
+        (Sample::Circle(7.0, MEAN), "AP around the command"),
+        (Sample::Circle(7.0, SPHERE), "RP around the mean"),
     ];
     let width = chart.size[0] - LEFT_PX;
-    legend(chart, [LEFT_PX, 40.0 + 0.5 * ROW_PX + 8.0], width, entries);
+    legend(
+        chart,
+        [LEFT_PX, 40.0 + 0.5 * LEGEND_ROW_PX + 8.0],
+        width,
+        entries,
+    );
 }
 
 #[cfg(test)]
 mod tests {
     use nalgebra::Point3;
-    use needlebench_evaluation::iso9283::{Commanded, evaluate};
+    use needlebench_iso9283::{Commanded, evaluate};
 
     use super::*;
-    use crate::chart::drawing::tests::assert_legible;
 
     fn measured(poses: u32, spread_m: f64) -> (ProtocolStatistics, Vec<Attained>) {
         let commanded: Vec<Commanded> = (1..=poses)
@@ -202,7 +203,7 @@ mod tests {
         for (poses, spread_m) in [(5, 2e-5), (1, 0.0), (3, 7e-4), (5, 3e-9), (5, 0.02)] {
             let (statistics, attained) = measured(poses, spread_m);
             let chart = attained_chart("a_scenario, rapier", &statistics, &attained);
-            assert_legible(&chart);
+            assert_eq!(chart.illegible(), None);
             let unit = match spread_m {
                 2e-5 => "um",
                 7e-4 | 0.02 => "mm",

@@ -1,13 +1,8 @@
 //! How arrivals settle.
 
-use needlebench_evaluation::iso9283::Arrival;
-
-use crate::chart::axis::Axis;
-use crate::chart::drawing::Chart;
-use crate::chart::legend::{Sample, legend_column};
-use crate::chart::paint::{Paint, Stroke};
-use crate::chart::panel::Panel;
-use crate::number::decade_of_length;
+use needlebench_iso9283::Arrival;
+use needlebench_show::chart::{Axis, Chart, Paint, Panel, Sample, Stroke, legend_column};
+use needlebench_show::number::decade_of_length;
 
 /// Decades of distance that are shown: 1 nm to 100 mm.
 const DECADES: [i32; 2] = [-9, -1];
@@ -29,7 +24,7 @@ const BAND: Stroke = Stroke {
 pub(crate) fn stabilisation_chart(heading: &str, arrivals: &[Arrival], limit_band_m: f64) -> Chart {
     let [left, top] = CORNER_PX;
     let [width, height] = PANEL_PX;
-    let title = format!("{heading}: coming to rest");
+    let title = format!("{heading}: stabilisation");
     let size = [left + width + BESIDE_PX, top + height + BELOW_PX];
     let mut chart = Chart::new(size, &*title);
     chart.write_large([20.0, 24.0], title);
@@ -47,7 +42,7 @@ pub(crate) fn stabilisation_chart(heading: &str, arrivals: &[Arrival], limit_ban
             last_s,
         ),
         y: Axis::decades(
-            "distance from where it comes to rest",
+            "distance from the rest position",
             DECADES,
             1,
             decade_of_length,
@@ -87,7 +82,6 @@ fn stroke(pose: u32) -> Stroke {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::drawing::tests::assert_legible;
 
     #[test]
     fn arrivals_are_legible_whatever_the_limit_band() {
@@ -100,11 +94,10 @@ mod tests {
             })
             .collect();
         for limit_band_m in [1e-5, 1e-4, 3e-3] {
-            assert_legible(&stabilisation_chart(
-                "test, rapier",
-                &arrivals,
-                limit_band_m,
-            ));
+            assert_eq!(
+                stabilisation_chart("test, rapier", &arrivals, limit_band_m,).illegible(),
+                None
+            );
         }
     }
 }
