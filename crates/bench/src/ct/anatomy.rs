@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use needlebench_cell::phantom::{Phantom, PhantomPart, Tissue};
 use needlebench_geometry::{ConvexMesh, Shape, Solid, TriangleMesh};
-use needlebench_imaging::synth::Scene;
+use needlebench_phantom::{Phantom, PhantomPart, Tissue};
+use needlebench_synthesis::Scene;
 use serde::Serialize;
 
 /// Hounsfield units of what a chest is made of. Textbook values, all of them assumed.
@@ -294,8 +294,8 @@ fn scaled(mesh: &TriangleMesh, by_m: f64) -> Option<TriangleMesh> {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_cell::phantom::PhantomParameters;
-    use needlebench_cell::scenario::MarkerKind;
+    use needlebench_phantom::PhantomParameters;
+    use needlebench_scenario::scenario::MarkerKind;
 
     use super::*;
 

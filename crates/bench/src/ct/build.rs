@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Matrix3, Point3};
-use needlebench_cell::scenario::PartTissue;
 use needlebench_geometry::mesh::extent_m;
 use needlebench_imaging::markers::{DetectedMarker, Found, MarkerModel, Options, find_markers};
 use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_labels};
@@ -16,6 +15,7 @@ use needlebench_imaging::{
     ImagingError, LabelMap, LesionSeed, ReconstructOptions, Reconstruction, Remark, Surface,
     SurfaceSizes, SurfaceTissue, Volume, reconstruct, resample, structure_of,
 };
+use needlebench_scenario::scenario::PartTissue;
 use serde::Serialize;
 
 use super::digest::voxels_sha256;
@@ -224,7 +224,7 @@ fn without_scraps(surfaces: &mut Vec<Surface>) -> Vec<Remark> {
         if !is_part {
             remarks.push(
                 Remark::new(format!(
-                    "{:.1} x {:.1} x {:.1} mm, less than {least_mm} mm along every axis: left out",
+                    "{:.1} x {:.1} x {:.1} mm, less than {least_mm} mm along every axis: omitted",
                     size_mm.x, size_mm.y, size_mm.z
                 ))
                 .at(format!("surface `{}`", surface.name)),
@@ -306,7 +306,10 @@ fn labels_of(
             names.take(8).collect::<Vec<_>>().join(", ")
         ))
         .at(place)
-        .hint("say what they are called with --label-names: names as TotalSegmentator's or 3D Slicer's are known"));
+        .hint(
+            "give their names with --label-names; names of TotalSegmentator and 3D Slicer are \
+             known",
+        ));
     }
     Ok(map)
 }
@@ -366,7 +369,8 @@ fn with_found(error: ImagingError, found: &Found) -> ImagingError {
             message: format!("{message}; {} were found in the scan", found.markers.len()),
             hint: hint.or_else(|| {
                 Some(
-                    "check diameter and kind of the markers, and that the list is of this patient"
+                    "check diameter and kind of the markers, and that the list belongs to this \
+                     patient"
                         .to_owned(),
                 )
             }),

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::scenario::Scenario;
-use needlebench_cell::{Finding, read_text};
 use needlebench_imaging::read::{ReadOptions, read_label_names, read_labels, read_volume};
 use needlebench_imaging::registration::{ReferenceFrame, Registration};
 use needlebench_imaging::{ImagingError, LabelMap, Volume, VoxelGrid};
+use needlebench_input::{Finding, read_text};
+use needlebench_scenario::scenario::Scenario;
 use serde::Deserialize;
 
 use super::digest::voxels_sha256;
@@ -20,9 +20,9 @@ const SAME_PLACE_M: f64 = 1e-5;
 /// The version of `report.json` that is read.
 const VERSION: u32 = 1;
 /// What to do about a folder that was not built, or not for this.
-const BUILD: &str = "`needlebench ct build SCAN --out DIR` makes such a folder";
-const BUILD_ANEW: &str = "volume, labels, surfaces and scenario have to come from one `needlebench ct build`: build the folder \
-     anew";
+const BUILD: &str = "create such a folder with `needlebench ct build SCAN --out DIR`";
+const BUILD_ANEW: &str = "volume, labels, surfaces and scenario must come from one `needlebench ct build`; rebuild the \
+     folder";
 
 /// What of `report.json` is used again. Lengths in m, places in `ct`.
 #[derive(Debug, Clone, Deserialize)]
@@ -186,12 +186,12 @@ impl BuiltFolder {
     pub fn not_registered(&self) -> Option<&'static str> {
         match self.facts.registration.as_ref().map(|it| it.frame) {
             None => Some(
-                "no registration: nothing says where the robot is from this patient; build it with --markers, touched by \
-                 the robot",
+                "no registration: the scan is not registered to the robot; build it with --markers \
+                 digitised with the robot",
             ),
             Some(ReferenceFrame::Phantom) => Some(
-                "the markers are those of a drawing, which says nothing of the robot; build it with markers that the robot \
-                 has touched",
+                "the marker positions are from a drawing, which does not register the robot; build \
+                 it with markers digitised with the robot",
             ),
             Some(ReferenceFrame::Robot) => None,
         }
@@ -204,7 +204,7 @@ impl BuiltFolder {
     pub fn volume(&self, cancel: &AtomicBool) -> Result<Volume, Stop> {
         let path = self.folder.join(VOLUME_FILE);
         if !path.is_file() {
-            let error = ImagingError::refused("there is no volume to show").hint(
+            let error = ImagingError::refused("no volume to show").hint(
                 "build the folder without --no-volume: `needlebench ct build SCAN --out DIR`",
             );
             return Err(Stop::of_scan(&path, error));
@@ -214,16 +214,16 @@ impl BuiltFolder {
         let mut volume = read.volume;
         let sha256 = self.facts.voxels_sha256.as_deref();
         let other = if volume.grid.size() != self.facts.size {
-            Some("another number of voxels")
+            Some("a different number of voxels")
         } else if volume.grid.farthest_corners_m(&self.labels.grid) > SAME_PLACE_M {
-            Some("voxels at other places")
+            Some("voxels at different positions")
         } else if sha256 != Some(&voxels_sha256(&volume.hu, i16::to_le_bytes)) {
-            Some("other Hounsfield units")
+            Some("different Hounsfield units")
         } else {
             None
         };
         if let Some(other) = other {
-            let message = format!("it is not the volume of {REPORT_FILE}: {other}");
+            let message = format!("not the volume of {REPORT_FILE}: {other}");
             let error = ImagingError::refused(message).hint(BUILD_ANEW);
             return Err(Stop::of_scan(&path, error));
         }
@@ -246,14 +246,14 @@ impl BuiltFolder {
             let Some(part) = parts.find(|it| it.name == surface.name && it.file == surface.file)
             else {
                 return Err(other(format!(
-                    "it has no part `{}` of the file {}, which {REPORT_FILE} has",
+                    "no part `{}` of the file {}, which {REPORT_FILE} has",
                     surface.name, surface.file
                 )));
             };
             let off_m = (Vector3::from(part.position_mm) * 1e-3 + self.origin_in_ct_m()).norm();
             if off_m > SAME_PLACE_M {
                 return Err(other(format!(
-                    "part `{}` is {:.2} mm from where {REPORT_FILE} has it",
+                    "part `{}` is {:.2} mm from its position in {REPORT_FILE}",
                     part.name,
                     off_m * 1e3
                 )));
@@ -265,15 +265,14 @@ impl BuiltFolder {
 
 fn read_facts(path: &Path) -> Result<BuildFacts, ImagingError> {
     let text = read_text(path).map_err(|error| ImagingError::refused(error.to_string()))?;
-    let facts: BuildFacts = serde_json::from_str(&text).map_err(|error| {
-        ImagingError::refused(format!("it is not what `ct build` writes: {error}"))
-    })?;
+    let facts: BuildFacts = serde_json::from_str(&text)
+        .map_err(|error| ImagingError::refused(format!("not written by `ct build`: {error}")))?;
     if facts.schema_version == VERSION {
         return Ok(facts);
     }
     let version = facts.schema_version;
     Err(
-        ImagingError::refused(format!("it is {version}, and {VERSION} is known"))
+        ImagingError::refused(format!("version {version}, supported is {VERSION}"))
             .at("schema_version"),
     )
 }
@@ -287,7 +286,7 @@ fn labels(
 ) -> Result<LabelMap, Stop> {
     let path = folder.join(LABELS_FILE);
     if !path.is_file() {
-        let error = ImagingError::refused("there is no label map")
+        let error = ImagingError::refused("no label map")
             .hint("build the folder without --no-labels: `needlebench ct build SCAN --out DIR`");
         return Err(Stop::of_scan(&path, error));
     }
@@ -295,7 +294,7 @@ fn labels(
         .map_err(|error| Stop::of_scan(&path, error))?;
     let labels = read.labels.labels;
     if facts.labels_sha256.as_deref() != Some(&voxels_sha256(&labels, u16::to_le_bytes)) {
-        let error = ImagingError::refused(format!("it is not the label map of {REPORT_FILE}"));
+        let error = ImagingError::refused(format!("not the label map of {REPORT_FILE}"));
         return Err(Stop::of_scan(&path, error.hint(BUILD_ANEW)));
     }
     let names = folder.join(NAMES_FILE);
@@ -306,7 +305,7 @@ fn labels(
     })
 }
 
-/// Surfaces have to be those of the report, by the number of their triangles.
+/// Surfaces must be those of the report, by the number of their triangles.
 fn check_surfaces(folder: &Path, facts: &BuildFacts) -> Result<(), Stop> {
     /// Bytes of a binary STL before its triangles, and of one.
     const HEAD: u64 = 84;
@@ -315,7 +314,7 @@ fn check_surfaces(folder: &Path, facts: &BuildFacts) -> Result<(), Stop> {
         let path = folder.join(&surface.file);
         let size = path.metadata().map(|metadata| metadata.len());
         if size.ok() != Some(HEAD + TRIANGLE * surface.triangles) {
-            let message = format!("it is not the surface `{}` of {REPORT_FILE}", surface.name);
+            let message = format!("not the surface `{}` of {REPORT_FILE}", surface.name);
             let error = ImagingError::refused(message).hint(BUILD_ANEW);
             return Err(Stop::of_scan(&path, error));
         }

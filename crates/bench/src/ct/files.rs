@@ -3,8 +3,6 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use needlebench_cell::scenario::Scenario;
-use needlebench_cell::scenario_text;
 use needlebench_imaging::markers::{DetectedMarker, Rejected};
 use needlebench_imaging::read::Description;
 use needlebench_imaging::registration::{MarkerMatch, Registration};
@@ -12,6 +10,8 @@ use needlebench_imaging::write::{write_bytes, write_label_nifti, write_nifti, wr
 use needlebench_imaging::{
     ImagingError, LabelFacts, LesionSize, Remark, SurfaceError, SurfaceTissue,
 };
+use needlebench_scenario::scenario::Scenario;
+use needlebench_scenario::scenario_text;
 use serde::Serialize;
 
 use super::patient::{PatientFrame, SURFACES};
@@ -226,7 +226,7 @@ pub(crate) fn write_build(
     let mut files = Vec::new();
     let surfaces = folder.join(SURFACES);
     std::fs::create_dir_all(&surfaces).map_err(|error| {
-        ImagingError::refused(format!("it cannot be made: {error}"))
+        ImagingError::refused(format!("cannot be created: {error}"))
             .at(surfaces.display().to_string())
     })?;
     for surface in &build.seen.made.surfaces {

@@ -5,15 +5,16 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use needlebench_cell::phantom::Phantom;
-use needlebench_cell::scenario::{CtSection, GoalSection, MarkerKind, ScanKernel, ScanSlices};
-use needlebench_cell::{Finding, Overrides, ResolvedScenario, load_scenario, nearest_name};
 use needlebench_imaging::markers::MarkerModel;
 use needlebench_imaging::read::{Description, ReadVolume};
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker};
-use needlebench_imaging::synth::{Kernel, Noise, ScanPreset, Scanner, Streaks, synthesise_watched};
 use needlebench_imaging::{ImagingError, LesionSeed};
+use needlebench_input::{Finding, nearest_name};
 use needlebench_kinematics::Pose;
+use needlebench_phantom::Phantom;
+use needlebench_scenario::scenario::{CtSection, GoalSection, MarkerKind, ScanKernel, ScanSlices};
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
+use needlebench_synthesis::{Kernel, Noise, ScanPreset, Scanner, Streaks, synthesise_watched};
 
 use super::build::{BuildOptions, KnownMarkers, ScanBuild, SeenScan, register, see};
 use super::files::{BuildFiles, SCENARIO_FILE, write_build, write_json, write_scenario};
@@ -108,12 +109,12 @@ pub fn imaged(
         Stop::Refused(vec![Finding::new(file, message.to_owned()).key(key)])
     };
     let Some(section) = &resolved.scenario.ct else {
-        return Err(refused("it has no scan to make", "ct"));
+        return Err(refused("no scan to synthesise", "ct"));
     };
     let mut draws = Draws::new(resolved.scenario.seed);
     let order = order(section, resolved.scenario.seed, &mut draws);
     let Some(subject) = CtSubject::of_scenario(Path::new(file), resolved) else {
-        return Err(refused("there is nobody to scan", "phantom"));
+        return Err(refused("no patient to scan", "phantom"));
     };
     let scan = SyntheticScan::new(&subject, &order)
         .map_err(|error| Stop::of_scan(Path::new(file), error))?;
@@ -139,7 +140,7 @@ pub fn imaged(
         folder: Path::new(file).parent().unwrap_or(Path::new("")),
     };
     let first = format!(
-        "{}, as it was built from a synthetic scan of its phantom",
+        "{}, as built from a synthetic scan of its phantom",
         resolved.scenario.name
     );
     let path = write_patient(folder, &room, &build, goals, files, &first, control)?;
@@ -169,7 +170,7 @@ pub fn scanned(
     let file = resolved.source.file.clone();
     let one = |message: String| vec![Finding::new(&file, message).key("ct")];
     let folder = tempfile::tempdir()
-        .map_err(|error| one(format!("no folder for a scan can be made: {error}")))?;
+        .map_err(|error| one(format!("cannot create a folder for a scan: {error}")))?;
     let control = Control {
         threads: 1,
         cancel: &AtomicBool::new(false),
@@ -273,7 +274,7 @@ fn wanted(
     let Some(sphere_mm) = sphere_mm else {
         return Err(one(Finding::new(
             file,
-            "CT does not tell the phantom's markers from skin",
+            "the phantom's markers are isodense with skin",
         )
         .key("phantom.markers")
         .hint("`markers = \"ct_sphere\"` under [phantom]")));
@@ -355,11 +356,11 @@ fn goals(
         let truth = scan.truth.lesions.iter().find(|lesion| lesion.name == name);
         let is_built = build.targets.iter().any(|target| target.name == name);
         let Some(truth) = truth.filter(|_| is_built) else {
-            return Err(
-                ImagingError::refused(format!("lesion `{name}` is not seen in the scan"))
-                    .at(format!("goal `{}`", goal.name))
-                    .hint("thinner slices show smaller lesions"),
-            );
+            return Err(ImagingError::refused(format!(
+                "lesion `{name}` is not visible in the scan"
+            ))
+            .at(format!("goal `{}`", goal.name))
+            .hint("use thinner slices to image smaller lesions"));
         };
         let really_at = true_robot_from_ct * Point3::from(truth.center_m);
         let taken_for = match &build.registered {

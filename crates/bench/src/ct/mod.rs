@@ -12,7 +12,7 @@ mod scan_order;
 mod touched;
 mod truth;
 
-/// The room that a patient is put into unless somebody names another.
+/// The default room of a patient.
 pub const USUAL_ROOM: &str = include_str!("room.toml");
 
 pub use anatomy::Materials;

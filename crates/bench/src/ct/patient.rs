@@ -3,15 +3,15 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
-use needlebench_cell::ResolvedScenario;
-use needlebench_cell::phantom::Tissue;
-use needlebench_cell::scenario::{
-    CovarianceMm2, GoalSection, ImagingBlock, PartSection, PhantomSection, RegistrationBlock,
-    Scenario,
-};
 use needlebench_imaging::SurfaceTissue;
 use needlebench_imaging::registration::ReferenceFrame;
 use needlebench_kinematics::Pose;
+use needlebench_phantom::Tissue;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::scenario::{
+    CovarianceMm2, GoalSection, ImagingBlock, PartSection, PhantomSection, RegistrationBlock,
+    Scenario,
+};
 
 use super::ScanBuild;
 use super::build::part_tissue;
@@ -69,7 +69,7 @@ fn rounded(value: f64, step: f64) -> f64 {
 /// The room without its own patient.
 #[derive(Debug, Clone)]
 pub struct Room<'r> {
-    /// Robot, tool, table and all else; its phantom says how the patient lies.
+    /// Robot, tool, table and all else; its phantom gives the patient position.
     pub scenario: &'r Scenario,
     /// The same, resolved.
     pub resolved: &'r ResolvedScenario,
@@ -148,7 +148,7 @@ fn phantom(
     build: &ScanBuild,
     frame: &PatientFrame,
 ) -> PhantomSection {
-    let has_limbs = own.head || own.arms != needlebench_cell::scenario::Arms::None;
+    let has_limbs = own.head || own.arms != needlebench_scenario::scenario::Arms::None;
     let model = room
         .resolved
         .phantom
@@ -181,7 +181,7 @@ fn phantom(
         name: surface.name.clone(),
         file: format!("{SURFACES}/{}.stl", surface.name),
         tissue: part_tissue(surface.tissue),
-        unit: needlebench_cell::scenario::LengthUnit::Mm,
+        unit: needlebench_scenario::scenario::LengthUnit::Mm,
         position_mm,
         rpy_deg: [0.0; 3],
         flip: false,
@@ -204,7 +204,7 @@ fn phantom(
             depth_mm: None,
             length_mm: None,
             markers: None,
-            arms: needlebench_cell::scenario::Arms::None,
+            arms: needlebench_scenario::scenario::Arms::None,
             head: false,
             parts,
             ..own

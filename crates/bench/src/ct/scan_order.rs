@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
-use needlebench_cell::ResolvedScenario;
-use needlebench_cell::phantom::{Phantom, PhantomPart};
 use needlebench_geometry::{Shape, Solid};
-use needlebench_imaging::synth::{Scanner, Scene};
 use needlebench_imaging::{ImagingError, VoxelGrid};
 use needlebench_kinematics::Pose;
+use needlebench_phantom::{Phantom, PhantomPart};
+use needlebench_scenario::ResolvedScenario;
+use needlebench_synthesis::{Scanner, Scene};
 
 use super::truth::{lesions, markers, rows_of_grid, rows_of_pose};
 use super::{Materials, ScanTruth, phantom_scene};
@@ -78,7 +78,8 @@ pub struct ScanOrder {
     pub increment_m: f64,
     /// Columns and rows.
     pub size: usize,
-    /// Distance between pixels, m; as small as the body, with its markers, fits into the circle if left out, at least 0.7 mm.
+    /// Distance between pixels, m; as small as the body, with its markers, fits into the circle if left out, at least
+    /// 0.7 mm.
     pub pixel_m: Option<f64>,
     /// Which slices.
     pub range: ScanRange,
@@ -100,7 +101,7 @@ pub struct ScanOrder {
     pub seed: u64,
 }
 
-/// All that a synthetic scan is made from, and the truth of it.
+/// All that a synthetic scan is made from, and its ground truth.
 #[derive(Debug, Clone)]
 pub struct SyntheticScan {
     /// What is scanned, in `ct`.
@@ -111,7 +112,7 @@ pub struct SyntheticScan {
     pub ct_from_phantom: Pose,
     /// From `ct` to the robot's `base_link`, where there is a robot.
     pub robot_from_ct: Option<Pose>,
-    /// The truth.
+    /// The ground truth.
     pub truth: ScanTruth,
 }
 
@@ -119,7 +120,8 @@ pub struct SyntheticScan {
 const LEAST_PIXEL_M: f64 = 0.7e-3;
 /// Body in the circle: what is left beside it, m.
 const BESIDE_M: f64 = 10e-3;
-/// The bed: a mattress of foam on a plate of carbon fibre, in the order from the patient down; thickness in m and HU (assumed).
+/// The bed: a mattress of foam on a plate of carbon fibre, in the order from the patient down; thickness in m and HU
+/// (assumed).
 const BED: [(&str, f64, f64); 3] = [
     ("mattress", 15e-3, -950.0),
     ("bed_shell", 2e-3, -100.0),
@@ -229,7 +231,7 @@ impl ScanOrder {
         let slices = ((to_m - from_m) / self.increment_m).ceil().max(1.0);
         if !slices.is_finite() || slices > f64::from(u16::MAX) {
             return Err(ImagingError::refused(format!(
-                "{slices} slices from {:.1} to {:.1} mm every {} mm; 65535 at most",
+                "{slices} slices from {:.1} to {:.1} mm with spacing {} mm; at most 65535",
                 1e3 * from_m,
                 1e3 * to_m,
                 1e3 * self.increment_m
@@ -256,7 +258,7 @@ impl ScanOrder {
             steps_m,
             Point3::from(first_m),
         )
-        .map_err(|error| ImagingError::refused(format!("no such slices: {error}")))
+        .map_err(|error| ImagingError::refused(format!("invalid slices: {error}")))
     }
 }
 

@@ -1,9 +1,9 @@
 //! Where the robot has the markers of a synthetic scan.
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::scenario::MarkerKind;
-use needlebench_cell::{ListedMarker, MarkerFrame, MarkerList};
-use needlebench_kinematics::random::NormalPairs;
+use needlebench_numerics::random::NormalPairs;
+use needlebench_scenario::scenario::MarkerKind;
+use needlebench_scenario::{ListedMarker, MarkerFrame, MarkerList};
 
 use super::SyntheticScan;
 
@@ -28,8 +28,8 @@ impl Draws {
     }
 }
 
-/// The list of the markers of a scan that CT sees: in the robot's `base_link`, touched with this standard deviation along
-/// each axis, where there is a robot; else by the phantom's drawing. None without such markers.
+/// The list of the markers of a scan that CT sees: in the robot's `base_link`, digitised with this standard deviation
+/// along each axis, where there is a robot; else by the phantom's drawing. None without such markers.
 pub fn marker_list(scan: &SyntheticScan, kind: MarkerKind, touch_m: f64) -> Option<MarkerList> {
     let mut draws = Draws::new(scan.truth.seed);
     let (frame, place_of) = match scan.robot_from_ct {

@@ -1,15 +1,16 @@
 //! What is known of a synthetic scan.
 
 use nalgebra::Point3;
-use needlebench_cell::phantom::Phantom;
 use needlebench_imaging::VoxelGrid;
-use needlebench_imaging::synth::Scanner;
 use needlebench_kinematics::Pose;
+use needlebench_phantom::Phantom;
+use needlebench_synthesis::Scanner;
 use serde::Serialize;
 
 use super::Materials;
 
-/// The truth of a synthetic scan. Lengths in m, places in frame `ct` (patient LPS); a transform `a_from_b` is the rows of its 4 x 4 matrix.
+/// The ground truth of a synthetic scan. Lengths in m, positions in frame `ct` (patient LPS); a transform `a_from_b` is
+/// the rows of its 4 x 4 matrix.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScanTruth {
     /// Of this document.

@@ -1,14 +1,14 @@
-//! What would let the robot serve a route that it does not.
+//! Changes that make an infeasible needle path feasible.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-use needlebench_cell::scenario::GoalSection;
-use needlebench_cell::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting};
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::Planner;
+use needlebench_scenario::scenario::GoalSection;
+use needlebench_scenario::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting};
 
 use super::RouteTask;
 use super::joint::ROLLS;
@@ -30,8 +30,8 @@ struct Try {
     changes: Vec<(KeyPath, Change)>,
 }
 
-/// Looks for the smallest changes that free the best route of a plan, if the robot does not serve it; `folder` is that of
-/// the scenario's file.
+/// Searches the smallest changes that make the best path of a plan feasible, if it is not; `folder` is that of the
+/// scenario's file.
 ///
 /// # Errors
 /// Interrupted.
@@ -51,7 +51,7 @@ pub fn free(
         return Ok(());
     };
     let tries = tries(task.resolved);
-    control.progress.message("what would free it");
+    control.progress.message("changes that make it feasible");
     control.progress.expect(tries.len() as u64);
     let found = in_parallel(control.threads, &tries, |each| {
         let working = (!control.is_cancelled()).then(|| working(&family, each));
@@ -82,7 +82,8 @@ pub fn free(
     }
     why_not.freeing = Some(Freeing {
         tried: format!(
-            "base along each axis and table up and down, by up to {:.0} mm in steps of {STEP_MM} mm, and each shipped tool",
+            "base along each axis and table height, by up to {:.0} mm in steps of {STEP_MM} mm, \
+             and each bundled tool",
             STEP_MM * f64::from(STEPS)
         ),
         freed: freed.into_iter().map(|(_, freed)| freed).collect(),
@@ -97,7 +98,7 @@ fn family(
     folder: &Path,
     overrides: &Overrides,
 ) -> Option<ScenarioFamily> {
-    let goal = needlebench_cell::GoalPlacer::new(resolved)
+    let goal = needlebench_scenario::GoalPlacer::new(resolved)
         .place(&section)
         .ok()?;
     let mut with_goal = resolved.clone();
@@ -135,7 +136,7 @@ fn tries(resolved: &ResolvedScenario) -> Vec<Try> {
             tries.extend(moved_table(resolved, sign * way_mm));
         }
     }
-    for tool in needlebench_cell::scenario::shipped_tools() {
+    for tool in needlebench_scenario::scenario::shipped_tools() {
         if tool != resolved.scenario.tool.urdf {
             tries.push(Try {
                 kind: "tool",

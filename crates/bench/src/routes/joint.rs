@@ -1,7 +1,5 @@
 //! Routes and the robot together.
 
-use needlebench_cell::scenario::GoalSection;
-use needlebench_cell::{Goal, GoalPlacer, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::Servo;
 use needlebench_evaluation::first_missed_by_posture;
@@ -11,6 +9,8 @@ use needlebench_kinematics::ik::Configuration;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::{Candidate, Member, Merit, Planner, judge_route};
 use needlebench_routing::{Obstacle, RouteRules};
+use needlebench_scenario::scenario::GoalSection;
+use needlebench_scenario::{Goal, GoalPlacer, ResolvedScenario};
 use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
 use serde::Serialize;
 
@@ -27,9 +27,9 @@ pub(super) const ROLLS: u32 = 12;
 #[derive(Debug, Clone)]
 pub(super) struct Asked {
     pub rounded: Rounded,
-    /// Why the goal cannot be there; none if it can, or nobody asked.
+    /// Why the goal cannot be there; none if it can, or was not checked.
     pub blocked: Option<String>,
-    /// The goal in the cell; none if it is blocked or nobody asked.
+    /// The goal in the cell; none if it is blocked or was not checked.
     pub goal: Option<Goal>,
     /// All eight, if the robot was asked.
     pub configurations: Vec<Served>,
@@ -39,15 +39,15 @@ pub(super) struct Asked {
 #[derive(Debug, Clone)]
 pub(super) struct Served {
     pub configuration: Configuration,
-    /// The first rule or criterion that it breaks; none if it works.
+    /// The first rule or criterion that it violates; none if it is feasible.
     pub reason: Option<String>,
-    /// The best posture, of those that work if any does.
+    /// The best posture: of the feasible ones, if there are any.
     pub candidate: Option<Candidate>,
     /// How good it is by the scenario's aim.
     pub value: Option<Merit>,
     /// Least clearance of arm and tool from what stands around, m; none where nothing does.
     pub clearance_m: Option<f64>,
-    /// What such clearances have beyond what they are judged by, m; infinite where there are none.
+    /// Such clearances in excess of the required ones, m; infinite where there are none.
     pub clear_spare_m: f64,
     /// Expected error, if the scenario expects one.
     pub error: Option<AxisError>,
@@ -85,7 +85,7 @@ impl Asked {
             .count()
     }
 
-    /// The configuration to choose: of those that work the best by the scenario's aim.
+    /// The configuration to choose: of the feasible ones the best by the scenario's aim.
     pub fn best(&self) -> Option<&Served> {
         let works = self.configurations.iter().filter(|each| each.works());
         works.fold(None, |best: Option<&Served>, each| match best {
@@ -98,8 +98,8 @@ impl Asked {
         })
     }
 
-    /// What is left: of the needle's margins, with the error of the configuration to choose, and of that configuration's
-    /// clearances; the least of them.
+    /// What is left: of the needle's margins, with the error of the configuration to choose, and of that
+    /// configuration's clearances; the least of them.
     pub fn spare_m(&self) -> f64 {
         let needle_m = self.rounded.route.spare_m;
         match self.best() {
@@ -109,36 +109,97 @@ impl Asked {
     }
 }
 
-/// Asks the robot of a scenario for routes.
+/// Checks the robot of a scenario for all needle paths at once.
 pub(super) fn ask(
     task: &RouteTask<'_>,
     rules: &RouteRules,
     routes: &[Rounded],
     control: &Control<'_>,
 ) -> Result<Vec<Asked>, SuggestError> {
+    with_robot(task, rules, routes, |robot, mut placed| {
+        control.progress.message("configurations");
+        control.progress.expect(robot.resolved.goals.len() as u64);
+        let answers = in_parallel(control.threads, &placed, |each| {
+            let answer = (!control.is_cancelled()).then(|| robot.answer(each));
+            if each.goal.is_some() {
+                control.progress.step();
+            }
+            answer
+        });
+        for (each, answer) in placed.iter_mut().zip(answers) {
+            each.asked.configurations = answer.ok_or(SuggestError::Interrupted)?;
+        }
+        Ok(placed.into_iter().map(|each| each.asked).collect())
+    })
+}
+
+/// Checks the robot for one needle path after the other, from the first on, until `enough` says that the next one need
+/// not be checked; returns those that were checked.
+pub(super) fn ask_until(
+    task: &RouteTask<'_>,
+    rules: &RouteRules,
+    routes: &[Rounded],
+    control: &Control<'_>,
+    enough: impl Fn(&[Asked], &Rounded) -> bool,
+) -> Result<Vec<Asked>, SuggestError> {
+    with_robot(task, rules, routes, |robot, placed| {
+        let mut asked: Vec<Asked> = Vec::new();
+        for mut each in placed {
+            if control.is_cancelled() {
+                return Err(SuggestError::Interrupted);
+            }
+            if enough(&asked, &each.asked.rounded) {
+                break;
+            }
+            each.asked.configurations = robot.answer(&each);
+            asked.push(each.asked);
+        }
+        Ok(asked)
+    })
+}
+
+/// A needle path in the cell, not checked yet.
+struct Placed {
+    asked: Asked,
+    /// Number of its goal in the cell; none if the goal cannot be there.
+    goal: Option<usize>,
+}
+
+/// A robot that stands by for some routes.
+fn with_robot<T>(
+    task: &RouteTask<'_>,
+    rules: &RouteRules,
+    routes: &[Rounded],
+    then: impl FnOnce(&Robot<'_>, Vec<Placed>) -> Result<T, SuggestError>,
+) -> Result<T, SuggestError> {
     let placer = GoalPlacer::new(task.resolved);
-    let mut asked: Vec<Asked> = Vec::with_capacity(routes.len());
+    let mut placed: Vec<Placed> = Vec::with_capacity(routes.len());
     let mut sections: Vec<GoalSection> = Vec::new();
     let mut goals: Vec<Goal> = Vec::new();
     for rounded in routes {
         let section = task.section_at(rounded.direction_deg);
-        let mut each = Asked::without_robot(rounded.clone());
+        let mut asked = Asked::without_robot(rounded.clone());
+        let mut number = None;
         match placer.place(&section) {
             Ok(goal) => {
-                each.goal = Some(goal.clone());
+                number = Some(goals.len());
+                asked.goal = Some(goal.clone());
                 sections.push(section);
                 goals.push(goal);
             }
-            Err(finding) => each.blocked = Some(finding.message),
+            Err(finding) => asked.blocked = Some(finding.message),
         }
-        asked.push(each);
+        placed.push(Placed {
+            asked,
+            goal: number,
+        });
     }
     let mut resolved = task.resolved.clone();
     resolved.goals = goals;
     resolved.scenario.goals = sections;
     let model = ClearanceModel::new(&resolved.cell);
     let planner = Planner::new(&resolved, &model)
-        .map_err(|error| SuggestError::refused(error.to_string(), "only UR arms can be asked"))?;
+        .map_err(|error| SuggestError::refused(error.to_string(), "only UR arms can be checked"))?;
     let robot = Robot {
         resolved: &resolved,
         planner: &planner,
@@ -146,21 +207,7 @@ pub(super) fn ask(
         servo: servo_of(&resolved),
         rules,
     };
-    control.progress.message("configurations");
-    control.progress.expect(resolved.goals.len() as u64);
-    let placed: Vec<usize> = (0..asked.len())
-        .filter(|&index| asked[index].goal.is_some())
-        .collect();
-    let numbered: Vec<(usize, usize)> = placed.into_iter().enumerate().collect();
-    let answers = in_parallel(control.threads, &numbered, |&(goal, index)| {
-        let answer = (!control.is_cancelled()).then(|| robot.serve(goal, &asked[index].rounded));
-        control.progress.step();
-        answer
-    });
-    for ((_, index), answer) in numbered.into_iter().zip(answers) {
-        asked[index].configurations = answer.ok_or(SuggestError::Interrupted)?;
-    }
-    Ok(asked)
+    then(&robot, placed)
 }
 
 /// The first criterion on clearances that a posture misses.
@@ -185,6 +232,13 @@ struct Robot<'a> {
 }
 
 impl Robot<'_> {
+    /// All eight configurations on a route; none where its goal cannot be.
+    fn answer(&self, placed: &Placed) -> Vec<Served> {
+        placed
+            .goal
+            .map_or_else(Vec::new, |goal| self.serve(goal, &placed.asked.rounded))
+    }
+
     /// All eight configurations of a goal.
     fn serve(&self, index: usize, rounded: &Rounded) -> Vec<Served> {
         let goal = &self.resolved.goals[index];
@@ -270,8 +324,8 @@ impl Robot<'_> {
         }
     }
 
-    /// The needle's expected error where the arm holds it, at the worse of skin and target: none if the scenario expects
-    /// none, an error if it cannot be told.
+    /// The needle's expected error where the arm holds it, at the worse of skin and target: none if the scenario
+    /// expects none, an error if it cannot be told.
     fn error(&self, goal: &Goal, candidate: &Candidate) -> Option<Result<AxisError, ()>> {
         let expected = self.resolved.expected.as_ref()?;
         let told = || {
@@ -285,7 +339,7 @@ impl Robot<'_> {
     }
 }
 
-/// The expected error across the needle.
+/// The RMS lateral error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AxisError {
     /// Mean error across it, at the worse of skin and target, m.
@@ -296,7 +350,7 @@ pub struct AxisError {
     pub target_lateral_rms_m: f64,
     /// Root mean square at the target, m.
     pub target_rms_m: f64,
-    /// Mean at the target; x and y across the needle, z along it, m.
+    /// Mean at the target; x and y lateral to the needle, z along it, m.
     pub target_bias_m: [f64; 3],
     /// Covariance at the target in these axes, m^2, row by row.
     pub target_covariance_m2: [[f64; 3]; 3],

@@ -1,55 +1,62 @@
-//! Routes of needles, planned with the robot: which entries reach a target without harm, which of them the arm can serve,
-//! in which configuration, with what margin and expected error, and what room is left.
+//! Needle paths, planned with the robot: which entries reach a target without harm, which of them are feasible for the
+//! arm, in which configuration, with what margin and expected error, and what room is left.
 //!
 //! # How they are found
 //!
-//! 1. Thousands of directions are judged by the rules and risks of [`needlebench_routing`], without the robot.
+//! 1. Thousands of directions are evaluated by the rules and risks of [`needlebench_routing`], without the robot.
 //! 2. Of those that are free, the best ones at least 2 deg apart, at most 200, are moved to the best place near by and
 //!    asked for: each of the eight configurations at 12 rolls, by the code of `check`; what works has the expected
 //!    error of its own arm, registration and patient, and has to keep the margins with it.
-//! 3. The choice is the best of those in which as many configurations work as the scenario wants. The odds ratios are not
-//!    known to a tenth: routes whose odds differ by less are equal, and have the order of what they have to spare.
-//!    Beside it stands what nothing beats in risk, clearance, expected error and room at once.
-//! 4. If a safer route fails by the robot alone, the smallest change that would free it is looked for.
+//! 3. The choice is the best of the paths with as many feasible configurations as the scenario requires. The odds
+//!    ratios are not known to a tenth: paths whose odds differ by less are equal, and are ordered by what is left of
+//!    their margins. Beside it stands what nothing beats in risk, clearance, expected error and room at once.
+//! 4. Configurations on the chosen route are ranked by a run of it ([`rank`]).
+//! 5. If a safer route fails by the robot alone, the smallest change that would free it is looked for.
 
 mod freeing;
 mod joint;
+mod ranked;
 mod report;
 
-use needlebench_cell::scenario::{GoalSection, RouteSection};
-use needlebench_cell::{Finding, GoalPlacer, ResolvedScenario};
+use std::sync::Arc;
+
 use needlebench_imaging::ImagingError;
+use needlebench_input::Finding;
 use needlebench_parallel::in_parallel;
+use needlebench_phantom::Phantom;
 use needlebench_routing::{
     Anatomy, Route, RouteRules, Searched, SolidAnatomy, VoxelAnatomy, VoxelOptions, angles_rad,
     apart, judge, outwards, refined, search,
 };
+use needlebench_scenario::scenario::{GoalSection, RouteSection};
+use needlebench_scenario::{GoalPlacer, ResolvedScenario};
 
 use crate::Control;
 use crate::ct::BuiltFolder;
 use crate::suggest::SuggestError;
-use joint::{Asked, ask};
+use joint::{Asked, Served, ask, ask_until};
 
 pub use freeing::free;
 pub use joint::AxisError;
+pub use ranked::rank;
 pub use report::{
     ChosenRoute, ConfigurationAnswer, Freed, Freeing, MapColumns, MarginReport, RouteAnswer,
     RoutePlan, RuleCount, WhyNot,
 };
 
-/// Directions that are judged in voxels.
+/// Directions that are evaluated in voxels.
 pub const VOXEL_DIRECTIONS: usize = 20_000;
-/// Directions that are judged among solids, whose distances are exact and take longer.
+/// Directions that are evaluated among solids, whose distances are exact and take longer.
 pub const SOLID_DIRECTIONS: usize = 4_000;
-/// Angle between directions that the robot is asked for, at least, rad: 2 deg.
+/// Least angle between directions that the robot is checked for, rad: 2 deg.
 const APART_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
-/// Directions that the robot is asked for, at most.
+/// Most directions that the robot is checked for.
 const MOST_ASKED: usize = 200;
 /// Smallest step of a direction that is moved to the best place near by, rad.
 const REFINED_RAD: f64 = 0.002;
 /// Logarithms of odds that differ by less are equal: a tenth, since no ratio is known better.
 pub const SAME_ODDS: f64 = 0.1;
-/// Steps that directions are rounded to, deg: what is written is what was judged.
+/// Steps that directions are rounded to, deg: what is written is what was evaluated.
 const ROUNDED: f64 = 100.0;
 
 /// Whether and why a robot is asked.
@@ -106,6 +113,12 @@ impl RouteTask<'_> {
         )
     }
 
+    /// Required number of feasible configurations.
+    fn wanted(&self) -> usize {
+        let criteria = &self.resolved.scenario.criteria;
+        (criteria.min_working_configurations as usize).max(1)
+    }
+
     /// The goal with the entry in a direction from its target, deg.
     fn section_at(&self, direction_deg: [f64; 2]) -> GoalSection {
         GoalSection {
@@ -147,18 +160,22 @@ impl RouteTask<'_> {
         )?)
     }
 
+    /// The patient.
+    pub(crate) fn phantom(&self) -> Result<&Arc<Phantom>, SuggestError> {
+        let placed = self.resolved.phantom.as_ref();
+        let placed =
+            placed.ok_or_else(|| SuggestError::refused("no patient", "add a [phantom] section"))?;
+        Ok(&placed.phantom)
+    }
+
     /// The phantom's solids about the target.
     ///
     /// # Errors
     /// If there is no patient or the target is none.
     pub fn solids(&self) -> Result<SolidAnatomy<'_>, SuggestError> {
         let target = GoalPlacer::new(self.resolved).target(self.section)?;
-        let placed = self.resolved.phantom.as_ref();
-        let placed = placed.ok_or_else(|| {
-            SuggestError::refused("there is no patient", "add a [phantom] section")
-        })?;
         Ok(SolidAnatomy::new(
-            &placed.phantom,
+            self.phantom()?,
             target,
             self.section.lesion.is_some(),
             &self.resolved.scenario.planning.needle_route,
@@ -171,6 +188,34 @@ impl RouteTask<'_> {
 struct Rounded {
     direction_deg: [f64; 2],
     route: Route,
+}
+
+/// The selected path, and the configurations feasible for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServedRoute {
+    /// Azimuth and elevation from the target, deg: `entry_direction_deg`.
+    pub direction_deg: [f64; 2],
+    /// From the skin to the target, m.
+    pub depth_m: f64,
+    /// How it compares: [`needlebench_routing::Risk::odds_ratio`].
+    pub odds_ratio: f64,
+    /// Feasible configurations, the margins included, with the error of each.
+    pub working: usize,
+    /// The one to choose among them.
+    pub best: &'static str,
+}
+
+impl ServedRoute {
+    fn of(asked: &Asked) -> Option<Self> {
+        let best: &Served = asked.best()?;
+        Some(Self {
+            direction_deg: asked.rounded.direction_deg,
+            depth_m: asked.rounded.route.depth_m,
+            odds_ratio: asked.rounded.route.risk.odds_ratio,
+            working: asked.working(),
+            best: best.configuration.label(),
+        })
+    }
 }
 
 /// Directions as the patient alone judges them, and those of the free ones that stand for the rest.
@@ -222,13 +267,13 @@ pub fn free_routes(
 }
 
 impl FreeRoutes {
-    /// The plan that the patient alone gives: nobody has asked a robot, or not yet.
+    /// The plan from the patient alone: the robot was not checked, or not yet.
     pub fn plan(&self, task: &RouteTask<'_>, anatomy: &dyn Anatomy) -> RoutePlan {
         let standing = self.standing.iter().cloned();
         let unasked = standing.map(Asked::without_robot).collect();
         let mut plan = self.ordered(task, anatomy, unasked);
         if plan.robot_not_asked.is_none() {
-            plan.robot_not_asked = Some("it is not asked yet".to_owned());
+            plan.robot_not_asked = Some("not checked yet".to_owned());
             plan.why_not = None;
         }
         plan
@@ -246,6 +291,54 @@ impl FreeRoutes {
     ) -> Result<RoutePlan, SuggestError> {
         let asked = ask(task, &self.rules, &self.standing, control)?;
         Ok(self.ordered(task, anatomy, asked))
+    }
+
+    /// The route that [`FreeRoutes::plan_with_robot`] chooses, without asking for others than could be it: what a robot
+    /// leaves to spare is no more than the needle has, so that the search ends where no route to come has as much.
+    ///
+    /// # Errors
+    /// If the robot is none that can be asked, or it was interrupted.
+    pub fn best_served(
+        &self,
+        task: &RouteTask<'_>,
+        control: &Control<'_>,
+    ) -> Result<Option<ServedRoute>, SuggestError> {
+        let least = least_log_odds(self.standing.iter());
+        let spare_m = |each: &Rounded| each.route.spare_m;
+        let mut standing = self.standing.clone();
+        standing
+            .sort_by(|a, b| better_first(least, (&a.route, spare_m(a)), (&b.route, spare_m(b))));
+        let wanted = task.wanted();
+        let enough = |asked: &[Asked], next: &Rounded| {
+            best_of(asked, least, wanted).is_some_and(|best| {
+                let best = (&best.rounded.route, best.spare_m());
+                better_first(least, best, (&next.route, spare_m(next))).is_lt()
+            })
+        };
+        let asked = ask_until(task, &self.rules, &standing, control, enough)?;
+        Ok(best_of(&asked, least, wanted).and_then(ServedRoute::of))
+    }
+
+    /// Why [`FreeRoutes::best_served`] has none for a task.
+    pub fn why_none(&self, task: &RouteTask<'_>) -> String {
+        let goal = &task.section.name;
+        if self.searched.free().is_empty() {
+            let refused = self.searched.refused();
+            let most = refused.iter().max_by_key(|(_, count)| *count);
+            format!(
+                "goal `{goal}` has no needle path: none of {} directions is admissible; most \
+                 frequent reason: {}",
+                self.searched.candidates.len(),
+                most.map_or("", |(rule, _)| rule.in_words())
+            )
+        } else {
+            format!(
+                "goal `{goal}` has no needle path feasible for the robot: none of {} \
+                 representative paths in {} of 8 configurations",
+                self.standing.len(),
+                task.wanted()
+            )
+        }
     }
 
     fn ordered(&self, task: &RouteTask<'_>, anatomy: &dyn Anatomy, asked: Vec<Asked>) -> RoutePlan {
@@ -292,7 +385,7 @@ fn rounded(anatomy: &dyn Anatomy, rules: &RouteRules, route: &Route) -> Option<R
     })
 }
 
-/// Of two routes with what each has to spare the better one first: by odds in steps that can be told apart, then by room.
+/// Of two routes with what each has to spare the better one first: by odds in distinguishable steps, then by margin.
 fn better_first(
     least_log_odds: f64,
     (a, a_spare_m): (&Route, f64),
@@ -305,11 +398,23 @@ fn better_first(
         .then(a.risk.log_odds.total_cmp(&b.risk.log_odds))
 }
 
+/// The best of those in which as many configurations are feasible as required.
+fn best_of(asked: &[Asked], least_log_odds: f64, wanted: usize) -> Option<&Asked> {
+    let served = asked.iter().filter(|each| each.working() >= wanted);
+    served.min_by(|a, b| {
+        let [a, b] = [a, b].map(|each| (&each.rounded.route, each.spare_m()));
+        better_first(least_log_odds, a, b)
+    })
+}
+
+fn least_log_odds<'a>(routes: impl Iterator<Item = &'a Rounded>) -> f64 {
+    routes
+        .map(|each| each.route.risk.log_odds)
+        .fold(f64::INFINITY, f64::min)
+}
+
 fn ordered(mut asked: Vec<Asked>) -> Vec<Asked> {
-    let least = asked
-        .iter()
-        .map(|each| each.rounded.route.risk.log_odds)
-        .fold(f64::INFINITY, f64::min);
+    let least = least_log_odds(asked.iter().map(|each| &each.rounded));
     asked.sort_by(|a, b| {
         better_first(
             least,

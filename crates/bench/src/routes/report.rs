@@ -1,9 +1,8 @@
 //! What was found, as a document.
 
 use needlebench_kinematics::ik::Configuration;
-use needlebench_routing::{
-    Anatomy, Nearest, Obstacle, Ray, Risk, RouteRule, RouteRules, Searched, pareto,
-};
+use needlebench_numerics::pareto::pareto_front;
+use needlebench_routing::{Anatomy, Nearest, Obstacle, Ray, Risk, RouteRule, RouteRules, Searched};
 use serde::Serialize;
 
 use super::joint::{Asked, AxisError, ROLLS, Served};
@@ -31,7 +30,7 @@ pub struct RoutePlan {
     pub margin_constant_m: f64,
     /// Standard deviations in them.
     pub sigmas: f64,
-    /// Directions that were judged.
+    /// Directions that were evaluated.
     pub tried: usize,
     /// Of these, free before the robot was asked.
     pub free: usize,
@@ -43,19 +42,19 @@ pub struct RoutePlan {
     pub robot_not_asked: Option<String>,
     /// Position of the robot's base, world; none if it was not asked.
     pub base_position_m: Option<[f64; 3]>,
-    /// Configurations that have to work.
+    /// Required number of feasible configurations.
     pub wanted: usize,
     /// Why configurations do not work on all these routes, the most frequent reason first.
     pub robot_refused: Vec<Refused>,
     /// Routes of which each stands for those around it, the best first.
     pub routes: Vec<RouteAnswer>,
-    /// The best route in which as many configurations work as wanted; without a robot the first.
+    /// The best route in which as many configurations are feasible as required; without a robot the first.
     pub chosen: Option<ChosenRoute>,
     /// What nothing beats in risk, clearance, expected error and room at once: number of a route and a configuration.
     pub pareto: Vec<(usize, &'static str)>,
-    /// The best route if the robot cannot serve it.
+    /// The best path if it is infeasible for the robot.
     pub why_not: Option<WhyNot>,
-    /// Every direction that was judged.
+    /// Every direction that was evaluated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<MapColumns>,
 }
@@ -67,7 +66,7 @@ pub struct BaseMargin {
     pub obstacle: &'static str,
     /// The least distance, m.
     pub margin_m: f64,
-    /// Whether the patient has anything of it, near or far. What nobody has seen is at no distance.
+    /// Whether the patient has any such structure labelled. One that is not labelled has no distance.
     pub known: bool,
 }
 
@@ -82,7 +81,7 @@ pub struct RuleCount {
     pub count: usize,
 }
 
-/// A route and who serves it.
+/// A needle path and the configurations feasible for it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RouteAnswer {
     /// Lines for the goal in a scenario.
@@ -109,15 +108,16 @@ pub struct RouteAnswer {
     pub risk: Risk,
     /// Why the guide cannot be there at all.
     pub blocked: Option<String>,
-    /// Configurations that work and keep the margins with their own error.
+    /// Feasible configurations, the margins included, with the error of each.
     pub working: usize,
-    /// The one to choose among them.
+    /// Of these the one with the best posture, by `planning.roll_aim`: motions and what else `run` ranks by are not
+    /// planned for all routes.
     pub best: Option<&'static str>,
     /// All eight, if the robot was asked.
     pub configurations: Vec<ConfigurationAnswer>,
 }
 
-/// A distance from an obstacle, and what it has to be.
+/// A distance from an obstacle, and the required one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MarginReport {
     /// Bone, vessel or organ.
@@ -127,7 +127,7 @@ pub struct MarginReport {
     /// Lower bound of the distance of the needle's surface, from the skin to as far as the needle is thrown; none if
     /// there is nothing.
     pub distance_m: Option<f64>,
-    /// The least that it has to be without the robot's own error.
+    /// The required distance without the robot's own error.
     pub margin_m: f64,
 }
 
@@ -136,9 +136,9 @@ pub struct MarginReport {
 pub struct ConfigurationAnswer {
     /// Its label.
     pub label: &'static str,
-    /// It works and keeps the margins with its own error.
+    /// It is feasible and satisfies the margins including its own error.
     pub works: bool,
-    /// The first rule or criterion that it breaks.
+    /// The first rule or criterion that it violates.
     pub reason: Option<String>,
     /// Direction about the needle.
     pub roll_rad: Option<f64>,
@@ -148,7 +148,7 @@ pub struct ConfigurationAnswer {
     pub clearance_m: Option<f64>,
     /// What is left of the margins with this configuration's error; none if it is not known or nothing is near.
     pub spare_m: Option<f64>,
-    /// Share of the half ball of 0.35 m about the entry that arm and tool leave free.
+    /// Share of the hemisphere of 0.35 m about the entry that arm and tool do not occupy.
     pub free_fraction: Option<f64>,
     /// Expected error.
     pub error: Option<AxisError>,
@@ -159,11 +159,22 @@ pub struct ConfigurationAnswer {
 pub struct ChosenRoute {
     /// Its number in `routes`.
     pub route: usize,
-    /// The configuration; none if no robot was asked.
+    /// The configuration that `run` recommends; none if no robot was asked, or it recommends none. Until motions were
+    /// planned, the best by its posture.
     pub configuration: Option<&'static str>,
+    /// Why, in the words of `run`; none until motions were planned.
+    pub because: Option<String>,
 }
 
-/// A safer route that the robot does not serve.
+impl ChosenRoute {
+    /// No configuration is recommended, and why.
+    pub fn leave_open(&mut self, why: String) {
+        self.configuration = None;
+        self.because = Some(why);
+    }
+}
+
+/// A safer path that is infeasible for the robot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WhyNot {
     /// Its number in `routes`.
@@ -181,12 +192,12 @@ pub struct WhyNot {
 pub struct Freeing {
     /// What was tried, for people.
     pub tried: String,
-    /// The smallest change of each kind that lets as many configurations work as wanted; of equals the one with more
-    /// that work.
+    /// The smallest change of each kind that makes as many configurations feasible as required; of equals the one with
+    /// more feasible ones.
     pub freed: Vec<Freed>,
 }
 
-/// A change that frees a route. Postures only are judged, without expected errors.
+/// A change that makes a path feasible. Only postures are evaluated, without RMS errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Freed {
     /// `base`, `table` or `tool`.
@@ -199,7 +210,7 @@ pub struct Freed {
     pub working: usize,
 }
 
-/// All directions that were judged, column by column.
+/// All directions that were evaluated, column by column.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MapColumns {
     /// Rules by number.
@@ -275,8 +286,7 @@ pub(super) fn plan(
     searched: &Searched,
     asked: &[Asked],
 ) -> RoutePlan {
-    let criteria = &task.resolved.scenario.criteria;
-    let wanted = (criteria.min_working_configurations as usize).max(1);
+    let wanted = task.wanted();
     let with_robot = task.robot == WithRobot::Yes;
     let serves = |each: &Asked| !with_robot || each.working() >= wanted;
     let chosen = asked.iter().position(serves);
@@ -329,6 +339,7 @@ pub(super) fn plan(
         chosen: chosen.map(|route| ChosenRoute {
             route,
             configuration: asked[route].best().map(|best| best.configuration.label()),
+            because: None,
         }),
         why_not: why_not.map(|first| WhyNot {
             route: 0,
@@ -369,7 +380,11 @@ fn unbeaten(asked: &[Asked]) -> Vec<(usize, &'static str)> {
             ]);
         }
     }
-    pareto(&aims)
+    let dominates = |a: &[f64; 4], b: &[f64; 4]| {
+        let mut pairs = a.iter().zip(b);
+        pairs.clone().all(|(a, b)| a <= b) && pairs.any(|(a, b)| a < b)
+    };
+    pareto_front(&aims, dominates)
         .into_iter()
         .map(|index| pairs[index])
         .collect()

@@ -1,11 +1,12 @@
 //! The rows of a generation's cases.
 
+use needlebench_scenario::study::StudyMode;
 use needlebench_study::search::GenerationDesign;
 use needlebench_study::{CaseDesign as _, CaseError, CaseEvaluator, CaseResult, CaseWorker};
 
 use super::PreparedSearch;
 use crate::ct::{LastScan, scanned};
-use crate::study::{StaticWorker, StudyCase, counted_classes, invalid_rows};
+use crate::study::{StaticWorker, StudyCase, counted_classes, rows_without_scenario};
 
 /// Computes the cases of a generation: final postures.
 pub struct GenerationEvaluator<'a> {
@@ -40,7 +41,7 @@ impl CaseWorker for Worker<'_> {
             .scenario(study)
             .and_then(|resolved| scanned(resolved, study.family.overrides(), &mut self.scan))
         {
-            Err(findings) => invalid_rows(&findings),
+            Err(findings) => rows_without_scenario(&findings, StudyMode::Static),
             Ok(resolved) => self.postures.rows(&resolved),
         };
         Ok(CaseResult {

@@ -1,5 +1,4 @@
-//! A study ready to be searched: its candidates and circumstances, what computes their cases, and what those are
-//! worth.
+//! A study ready to be searched: its candidates and circumstances, the evaluation of their cases, and the outcomes.
 
 mod evaluator;
 mod placement;

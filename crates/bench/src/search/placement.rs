@@ -1,8 +1,8 @@
-//! What a candidate looks like: the scenario with its choices, and the best posture in it.
+//! The placement of a candidate: the scenario with its values, and the best posture in it.
 
-use needlebench_cell::study::FactorValues;
-use needlebench_cell::{Change, ResolvedScenario, Setting};
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::study::FactorValues;
+use needlebench_scenario::{Change, ResolvedScenario, Setting};
 use needlebench_study::search::SearchLog;
 use needlebench_study::{FactorValue, Role};
 

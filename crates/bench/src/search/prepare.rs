@@ -1,8 +1,8 @@
-//! From a study to what is searched.
+//! From a study to a search.
 
-use needlebench_cell::study::search::{ObjectiveName, SearchSection};
-use needlebench_cell::study::{FactorValues, ResolvedStudy, StudyMode};
-use needlebench_cell::{Finding, sha256_hex};
+use needlebench_input::{Finding, sha256_hex};
+use needlebench_scenario::study::search::{ObjectiveName, SearchSection};
+use needlebench_scenario::study::{FactorValues, ResolvedStudy, StudyMode};
 use needlebench_study::search::{
     Candidate, Generation, GenerationDesign, Objective, SearchError, SearchPlan, SearchSpace,
     SpaceError, Stream,
@@ -13,13 +13,13 @@ use serde_json::json;
 use crate::provenance::{SOURCE_SHA256, arithmetic};
 use crate::study::{Identity, StudyColumns};
 
-/// Layouts that candidates may be compared by; fewer tell nothing apart.
+/// Layouts that candidates may be compared on; fewer give no significant differences.
 const SAMPLES_RANGE: std::ops::RangeInclusive<u64> = 16..=1_000_000;
-/// Layouts of the last candidates where nothing says how many.
+/// Default number of layouts of the finalists.
 const SAMPLES: u64 = 128;
-/// Cases of a search of ranges where nothing says how many.
+/// Default budget of a search of ranges, cases.
 const RANGES_BUDGET: u64 = 6144;
-/// Share of the cases of all choices with all layouts, where nothing says how many.
+/// Default budget, as the divisor of an exhaustive grid of candidates and layouts.
 const GRID_SHARE: u64 = 3;
 /// Cases of a block of a generation, which are written together.
 const BLOCK_CASES: u32 = 4;
@@ -29,11 +29,11 @@ const BLOCK_CASES: u32 = 4;
 pub struct PreparedSearch {
     /// The study as it was read.
     pub study: ResolvedStudy,
-    /// What is asked; the defaults if the study does not say it.
+    /// The `[search]` section, or its defaults.
     pub section: SearchSection,
     /// Its candidates and circumstances.
     pub space: SearchSpace,
-    /// What is looked for, at what cost.
+    /// Objective and cost.
     pub plan: SearchPlan,
     /// What decides its results.
     pub identity: Identity,
@@ -45,7 +45,7 @@ impl PreparedSearch {
     /// Makes candidates and circumstances of a study.
     ///
     /// # Errors
-    /// A study without choices or circumstances, or with a budget that is too small.
+    /// A study without control or noise factors, or with a budget that is too small.
     pub fn new(study: ResolvedStudy) -> Result<Self, Vec<Finding>> {
         let section = study.file.search.clone().unwrap_or_default();
         let samples = section
@@ -54,7 +54,7 @@ impl PreparedSearch {
             .unwrap_or(SAMPLES);
         if !SAMPLES_RANGE.contains(&samples) {
             let message = format!(
-                "samples is {samples} layouts, but a search compares candidates by {} to {}",
+                "samples is {samples} layouts; a search compares candidates on {} to {}",
                 SAMPLES_RANGE.start(),
                 SAMPLES_RANGE.end()
             );
@@ -62,7 +62,7 @@ impl PreparedSearch {
                 Finding::new(&study.source.file, message)
                     .key("sampling.samples")
                     .hint(
-                        "fewer tell nothing apart; `samples` under [search] is for a search alone",
+                        "fewer give no significant differences; `samples` under [search] applies to searches only",
                     ),
             ]);
         }
@@ -70,10 +70,10 @@ impl PreparedSearch {
             return Err(vec![
                 Finding::new(
                     &study.source.file,
-                    "`tip_error` is expected over real arms and patients, of which this scenario says too little",
+                    "`tip_error` is an RMS over arms and patients, which this scenario does not define",
                 )
                 .key("search.objective")
-                .hint("say them in [imperfections] of the scenario, or search by `margin` or `rate`"),
+                .hint("define them in [imperfections] of the scenario, or search by `margin` or `rate`"),
             ]);
         }
         let space = SearchSpace::new(&study, samples)
@@ -112,17 +112,17 @@ impl PreparedSearch {
         })
     }
 
-    /// Whether the expected error of the tip is an objective.
+    /// Whether the RMS tip error is an objective.
     pub(crate) fn expects_tip(&self) -> bool {
         expects_tip(&self.section)
     }
 
-    /// Cases of all choices with all layouts; none of choices with ranges.
+    /// Cases of an exhaustive grid of candidates and layouts; none with ranges.
     pub fn grid_cases(&self) -> Option<u64> {
         grid_cases(&self.space, self.plan.samples)
     }
 
-    /// The factors to choose.
+    /// The control factors.
     pub fn choices(&self) -> impl Iterator<Item = &Factor> {
         let factors = self.space.factors().iter();
         factors.filter(|factor| factor.role == Role::Choice)
@@ -207,7 +207,7 @@ fn expects_tip(section: &SearchSection) -> bool {
     section.objective == ObjectiveName::TipError || second == Some(ObjectiveName::TipError)
 }
 
-/// Whether there is an arm and a patient to expect an error of, in the scenario or by a factor.
+/// Whether the scenario or a factor defines an arm and patient population.
 fn has_imperfections(study: &ResolvedStudy) -> bool {
     study.family.base().expected.is_some()
         || study.factors.iter().any(|factor| match &factor.values {
@@ -231,16 +231,18 @@ fn space_finding(study: &ResolvedStudy, error: &SpaceError) -> Finding {
     let finding = Finding::new(&study.source.file, error.to_string()).key("factors");
     match error {
         SpaceError::NoChoice => finding.hint(
-            "give `role = \"choice\"` to what is yours to choose, such as the place of the robot's base",
+            "give `role = \"choice\"` to factors that you control, such as the base placement",
         ),
         SpaceError::NoCircumstance => finding.hint(
-            "add a factor that a choice is to hold for, such as `key = \"phantom.position_mm[0]\"`, \
+            "add a factor that you do not control, such as `key = \"phantom.position_mm[0]\"`, \
              `range = [-30, 30]`, `relative = true`",
         ),
-        SpaceError::Drawn { .. } => {
-            finding.hint("`range = [from, to]` has all between two ends, `grid` some of them")
+        SpaceError::Drawn { .. } => finding.hint(
+            "use `range = [from, to]` for all values between two ends, `grid` for some of them",
+        ),
+        SpaceError::TooManyRanges { .. } => {
+            finding.hint("use `values` for the least important ones")
         }
-        SpaceError::TooManyRanges { .. } => finding.hint("`values` for those that matter least"),
         SpaceError::TooManyDimensions { .. } => finding
             .key("sampling.method")
             .hint("`method = \"latin-hypercube\"` has no limit"),
@@ -254,18 +256,18 @@ fn plan_finding<S>(study: &ResolvedStudy, error: &SearchError<S>) -> Finding {
             budget,
             least,
             what,
-        } => format!("a budget of {budget} cases is too small: {least} are the least for {what}"),
+        } => format!("a budget of {budget} cases is too small: {what} require at least {least}"),
         SearchError::Combinations { combinations, most } => {
-            format!("{combinations} combinations of choices; at most {most} are looked at")
+            format!("{combinations} combinations of control factors; the limit is {most}")
         }
     };
     let finding = Finding::new(&study.source.file, message);
     match error {
         SearchError::Budget { least, .. } => finding.key("search.budget").hint(format!(
-            "`budget = {least}`, or fewer `samples` or `fresh` layouts under [search]"
+            "set `budget = {least}`, or use fewer `samples` or `fresh` (held-out) layouts under [search]"
         )),
         _ => finding
             .key("factors")
-            .hint("fewer levels; or `range` instead of `grid`, of which there may be several"),
+            .hint("use fewer levels, or `range` instead of `grid` (several are allowed)"),
     }
 }

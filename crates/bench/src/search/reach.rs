@@ -1,4 +1,4 @@
-//! A first look at cases: which of them no configuration comes to the needle in.
+//! Reachability of cases: which of them no configuration reaches.
 
 use needlebench_kinematics::ik::Kinematics;
 use needlebench_parallel::in_parallel;
@@ -9,7 +9,7 @@ use needlebench_study::search::{Generation, GenerationDesign};
 use super::PreparedSearch;
 use crate::study::StudyCase;
 
-/// By candidate and circumstance the most that the margin can be, mm, where no configuration reaches; none
+/// By candidate and circumstance an upper bound of the margin, mm, where no configuration reaches; none
 /// where any does, or nothing is known.
 ///
 /// A number here is as the table of results would have it. No clearance is asked for.

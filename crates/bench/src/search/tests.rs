@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use needlebench_cell::Overrides;
-use needlebench_cell::study::load_study;
+use needlebench_scenario::Overrides;
+use needlebench_scenario::study::load_study;
 use needlebench_study::search::{Generation, GenerationDesign, Purpose, Stream};
 use needlebench_study::{CaseEvaluator as _, Outcome};
 
@@ -142,7 +142,7 @@ fn out_of_reach_is_measured() {
 #[test]
 fn what_nothing_can_be_chosen_from_says_what_is_missing() {
     let studies = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/studies");
-    let study = load_study(&studies.join("layouts.toml"), &Overrides::default()).unwrap();
+    let study = load_study(&studies.join("equipment.toml"), &Overrides::default()).unwrap();
     let findings = PreparedSearch::new(study).unwrap_err();
     assert!(
         findings[0]

@@ -1,16 +1,15 @@
-//! What the rows of a case are worth.
+//! The outcome of the rows of a case.
 
 use needlebench_study::search::CaseWorth;
 use needlebench_study::{CaseResult, MetricColumn, Outcome};
 
 use crate::study::MARGIN_COLUMN;
 
-/// Column of the expected error of the tip, over all arms and patients. One draw's error is something else, and never
-/// stands for it.
+/// Column of the RMS tip error over the arm and patient population. The error of one draw is never used in its place.
 const TIP_ERROR: &str = "tip_rms_static";
 
-/// What a case is worth with its best configuration: the most margin of any; the least expected error of the tip of those
-/// that work.
+/// The outcome of a case with its best configuration: the largest margin of any; the least RMS tip error of the
+/// feasible ones.
 pub fn worth_of(columns: &[MetricColumn], case: &CaseResult) -> CaseWorth {
     let place = |name: &str| columns.iter().position(|each| each.name == name);
     let margin = place(MARGIN_COLUMN);

@@ -1,23 +1,23 @@
-//! Which shard a process is to compute, from what schedulers tell their tasks.
+//! The shard that a process computes, from the environment variables of schedulers.
 
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 use needlebench_study::Shard;
 
-/// Environment variable: number of shards. It wins over what a scheduler says of its array, which may be
-/// one of a few shards that were asked for again.
+/// Environment variable: number of shards. It takes precedence over a scheduler's array size, because an array may have
+/// only some shards that are repeated.
 pub const SHARDS_VARIABLE: &str = "NEEDLEBENCH_SHARDS";
 
-/// Environment variable: which shard, from 1; wins over schedulers.
+/// Environment variable: the shard, from 1; takes precedence over schedulers.
 pub const SHARD_VARIABLE: &str = "NEEDLEBENCH_SHARD";
 
-/// A shard, and who has assigned it.
+/// A shard, and what assigned it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Assignment {
     /// Which one.
     pub shard: Shard,
     /// The scheduler, for people.
     pub by: &'static str,
-    /// The variables that say so, with their values.
+    /// The variables that assign it, with their values.
     pub from: String,
 }
 
@@ -73,7 +73,7 @@ impl Variables<'_> {
             return Ok(None);
         };
         text.trim().parse().map(Some).map_err(|_| {
-            refusal(format!("{name}=\"{text}\" is no number")).hint(format!(
+            refusal(format!("{name}=\"{text}\" is not a number")).hint(format!(
                 "the scheduler sets it; {SHARDS_VARIABLE} and {SHARD_VARIABLE} are set by hand"
             ))
         })
@@ -87,20 +87,20 @@ fn refusal(message: String) -> Finding {
 /// Number of shards, if the environment names it: [`SHARDS_VARIABLE`].
 ///
 /// # Errors
-/// A value that is no number of shards.
+/// A value that is not a number of shards.
 pub fn shards_of(variables: &dyn Fn(&str) -> Option<String>) -> Result<Option<u32>, Finding> {
     match Variables(variables).number(SHARDS_VARIABLE)? {
         Some(0) => Err(refusal(format!(
-            "{SHARDS_VARIABLE}=0: there is at least one shard"
+            "{SHARDS_VARIABLE}=0: at least one shard is required"
         ))),
         shards => Ok(shards),
     }
 }
 
-/// Which shard a process is to compute, from its environment variables.
+/// The shard that a process computes, from its environment variables.
 ///
 /// # Errors
-/// None, several schedulers at a time, a number of shards that nobody says, or a task beyond it.
+/// No or several schedulers, an unknown number of shards, or a task beyond it.
 pub fn assignment(variables: &dyn Fn(&str) -> Option<String>) -> Result<Assignment, Finding> {
     let shards = shards_of(variables)?;
     let variables = Variables(variables);
@@ -120,8 +120,8 @@ pub fn assignment(variables: &dyn Fn(&str) -> Option<String>) -> Result<Assignme
         [] => {
             let names = SCHEDULERS.map(|each| format!("{} ({})", each.index, each.name));
             return Err(
-                refusal("no scheduler says which shard this is".to_owned()).hint(format!(
-                    "none of {} is set; elsewhere set {SHARD_VARIABLE} and {SHARDS_VARIABLE}, or ask for --shard K/N",
+                refusal("no scheduler assigns a shard".to_owned()).hint(format!(
+                    "none of {} is set; without a scheduler set {SHARD_VARIABLE} and {SHARDS_VARIABLE}, or give --shard K/N",
                     names.join(", ")
                 )),
             );
@@ -129,11 +129,11 @@ pub fn assignment(variables: &dyn Fn(&str) -> Option<String>) -> Result<Assignme
         several => {
             let said = several.iter().map(|each| variables.said(each.index));
             return Err(refusal(format!(
-                "several schedulers say which shard this is: {}",
+                "several schedulers assign a shard: {}",
                 said.collect::<Vec<_>>().join(", ")
             ))
             .hint(format!(
-                "unset all but one, or set {SHARD_VARIABLE}, which wins"
+                "unset all but one, or set {SHARD_VARIABLE}, which takes precedence"
             )));
         }
     };
@@ -147,7 +147,7 @@ pub fn assignment(variables: &dyn Fn(&str) -> Option<String>) -> Result<Assignme
     };
     let Some(parts) = shards.or(counted) else {
         return Err(refusal(format!(
-            "{} is set, and nobody says of how many shards",
+            "{} is set, but the number of shards is not",
             variables.said(scheduler.index)
         ))
         .hint(format!("set {SHARDS_VARIABLE} to the number of shards")));
@@ -166,12 +166,8 @@ pub fn assignment(variables: &dyn Fn(&str) -> Option<String>) -> Result<Assignme
         .and_then(|part| Shard::new(part, parts))
         .ok_or_else(|| {
             let last = u64::from(first) + u64::from(parts) - 1;
-            refusal(format!(
-                "{}: there is no such shard of {parts}",
-                from.join(", ")
-            ))
-            .hint(format!(
-                "{} of {} shards goes from {first} to {last}",
+            refusal(format!("{}: not one of {parts} shards", from.join(", "))).hint(format!(
+                "{} of {} shards runs from {first} to {last}",
                 scheduler.index, parts
             ))
         })?;
@@ -190,7 +186,7 @@ fn first_of(
 ) -> Result<u32, Finding> {
     let least = variables.number("SLURM_ARRAY_TASK_MIN")?;
     match (scheduler.index, shards, least) {
-        // Nobody could tell the shards of one that counts from 0 in an array of a few of them.
+        // An array that counts from 0 and has only some of the shards would be ambiguous.
         ("SLURM_ARRAY_TASK_ID", Some(shards), Some(0)) => Err(refusal(format!(
             "{} counts from 0, and with {SHARDS_VARIABLE}={shards} tasks are shards, from 1",
             variables.said("SLURM_ARRAY_TASK_MIN")
@@ -201,7 +197,7 @@ fn first_of(
     }
 }
 
-/// Number of tasks of a Slurm array, which has to be a whole one.
+/// Number of tasks of a Slurm array, which must be complete.
 fn slurm_count(variables: &Variables) -> Result<Option<u32>, Finding> {
     const NAMES: [&str; 3] = [
         "SLURM_ARRAY_TASK_MIN",
@@ -219,8 +215,8 @@ fn slurm_count(variables: &Variables) -> Result<Option<u32>, Finding> {
     if least > 1 || most.checked_sub(least).and_then(|span| span.checked_add(1)) != Some(count) {
         let said = NAMES.map(|name| variables.said(name)).join(", ");
         return Err(
-            refusal(format!("{said}: the array has only some of the shards")).hint(format!(
-                "set {SHARDS_VARIABLE} to the number of all shards; it wins over Slurm's numbers"
+            refusal(format!("{said}: the array does not have all shards")).hint(format!(
+                "set {SHARDS_VARIABLE} to the number of all shards; it takes precedence over Slurm's numbers"
             )),
         );
     }
@@ -295,7 +291,7 @@ mod tests {
     #[test]
     fn what_nobody_can_know_is_refused_with_names_and_values() {
         for (variables, parts) in [
-            (&[][..], ["no scheduler says", "SLURM_ARRAY_TASK_ID"]),
+            (&[][..], ["no scheduler assigns", "SLURM_ARRAY_TASK_ID"]),
             (
                 &[("JOB_COMPLETION_INDEX", "3")],
                 ["JOB_COMPLETION_INDEX=3", "NEEDLEBENCH_SHARDS"],
@@ -353,11 +349,11 @@ mod tests {
             ),
             (
                 &[("PBS_ARRAY_INDEX", "first"), ("NEEDLEBENCH_SHARDS", "8")],
-                ["PBS_ARRAY_INDEX=\"first\"", "no number"],
+                ["PBS_ARRAY_INDEX=\"first\"", "not a number"],
             ),
             (
                 &[("PBS_ARRAY_INDEX", "1"), ("NEEDLEBENCH_SHARDS", "-8")],
-                ["NEEDLEBENCH_SHARDS=\"-8\"", "no number"],
+                ["NEEDLEBENCH_SHARDS=\"-8\"", "not a number"],
             ),
         ] {
             let finding = assigned(variables).unwrap_err();

@@ -1,8 +1,9 @@
 //! From the number of a case to its layout.
 
-use needlebench_cell::scenario::EngineName;
-use needlebench_cell::study::{FactorValues, ResolvedStudy, StudyMode};
-use needlebench_cell::{Change, Finding, KeyPath, ResolvedScenario, Setting};
+use needlebench_input::Finding;
+use needlebench_scenario::scenario::EngineName;
+use needlebench_scenario::study::{FactorValues, ResolvedStudy, StudyMode};
+use needlebench_scenario::{Change, KeyPath, ResolvedScenario, Setting};
 use needlebench_study::{Design, FactorKind, FactorValue};
 
 /// One case: what is changed in the scenario, and what is computed.

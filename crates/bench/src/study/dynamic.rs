@@ -4,19 +4,18 @@ use std::borrow::Cow;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use needlebench_cell::ResolvedScenario;
-use needlebench_cell::study::StudyMode;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineError, EnginePool, engine_names};
 use needlebench_evaluation::judge;
 use needlebench_evaluation::report::{Judged, Status};
-use needlebench_planning::GoalPlan;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::study::StudyMode;
 use needlebench_study::Outcome;
 
 use crate::adjudication::Adjudicated;
 use crate::control::Control;
 use crate::events::{self, EventRun};
-use crate::plan::{Job, jobs, plan_goals};
+use crate::plan::{Planned, plan_goals};
 use crate::progress::Silent;
 use crate::setup::Setup;
 use crate::simulate::{Detail, EngineRun, Simulation};
@@ -24,7 +23,7 @@ use crate::simulate::{Detail, EngineRun, Simulation};
 use super::planned::{case_report, case_setup, eight};
 use super::rows::{CaseRow, broken_rule};
 
-/// How the detail of a configuration begins whose motion an engine could not carry out; the engine follows.
+/// Prefix of the detail of a configuration whose motion an engine could not execute; the engine follows.
 pub const ENGINE_FAILURE: &str = "engine_failure";
 
 /// Nobody interrupts a case: a study ends between two of them.
@@ -67,7 +66,7 @@ impl CaseCost {
 /// The rows of a case by the motions in the engines: what [`run_scenario`](crate::run_scenario) would
 /// report of the same scenario, number for number.
 ///
-/// A configuration whose motion an engine cannot carry out is [`Outcome::NotJudged`] with the detail
+/// A configuration whose motion an engine cannot execute is [`Outcome::NotJudged`] with the detail
 /// `engine_failure rapier`, and no measured numbers.
 ///
 /// # Errors
@@ -100,9 +99,9 @@ pub fn dynamic_case(
         progress: &Silent,
     };
     let planning = Instant::now();
-    let plans = plan_goals(&setup, &control);
+    let planned = plan_goals(&setup, &control);
     cost.planning = planning.elapsed();
-    let mut case = Case::new(&setup, &plans);
+    let mut case = Case::new(&setup, &planned);
     for &engine in engines {
         let begun = Instant::now();
         if let Err(error) = case.run_in(engine, pool, &control) {
@@ -120,8 +119,7 @@ pub fn dynamic_case(
 /// One case under way.
 struct Case<'a> {
     setup: &'a Setup<'a>,
-    plans: &'a [GoalPlan],
-    jobs: Vec<Job>,
+    planned: &'a Planned,
     /// By configuration.
     runs: Vec<Vec<EngineRun>>,
     /// By configuration: the first engine that failed it.
@@ -130,15 +128,14 @@ struct Case<'a> {
 }
 
 impl<'a> Case<'a> {
-    fn new(setup: &'a Setup<'a>, plans: &'a [GoalPlan]) -> Self {
-        let count = plans[0].configurations.len();
+    fn new(setup: &'a Setup<'a>, planned: &'a Planned) -> Self {
+        let count = planned.goals[0].configurations.len();
         Self {
             setup,
-            plans,
-            jobs: jobs(setup, plans),
+            planned,
             runs: vec![Vec::new(); count],
             failed: vec![None; count],
-            events: events::stage(setup, plans, 1),
+            events: events::stage(setup, planned, 1),
         }
     }
 
@@ -154,8 +151,8 @@ impl<'a> Case<'a> {
     ) -> Result<(), EngineError> {
         let simulation = Simulation {
             setup: self.setup,
-            plans: self.plans,
-            jobs: &self.jobs,
+            plans: &self.planned.goals,
+            jobs: &self.planned.simulated,
             detail: Detail::Least,
             restart: true,
         };
@@ -171,7 +168,7 @@ impl<'a> Case<'a> {
         }
         let done = events::simulate(
             self.setup,
-            self.plans,
+            &self.planned.goals,
             &self.events,
             pool,
             engine,
@@ -199,7 +196,7 @@ impl<'a> Case<'a> {
                 runs.clear();
             }
         }
-        let (setup, plan) = (self.setup, &self.plans[0]);
+        let (setup, plan) = (self.setup, &self.planned.goals[0]);
         let judged = |runs: &Vec<EngineRun>| Adjudicated::without_referee(setup, 0, runs);
         let adjudicated: Vec<Adjudicated> = self.runs.iter().map(judged).collect();
         let report = case_report(setup, plan, &self.runs, &adjudicated, &self.events, engines);
@@ -234,7 +231,7 @@ impl<'a> Case<'a> {
     }
 }
 
-/// The first criterion that a configuration misses, or else that could not be judged.
+/// The first criterion that a configuration fails, or else that could not be evaluated.
 fn missed(judged: &Judged, label: &str) -> (Outcome, Cow<'static, str>) {
     let counts = |of: Option<&str>, criterion: &str| of == Some(label) && criterion != "expected";
     let missed = judged

@@ -1,7 +1,7 @@
 //! The rows of a case, by what the study computes of it.
 
-use needlebench_cell::study::{ResolvedStudy, StudyMode};
 use needlebench_engine::{ENGINES, EnginePool, choose_engines};
+use needlebench_scenario::study::{ResolvedStudy, StudyMode};
 use needlebench_study::{CaseError, CaseEvaluator, CaseResult, CaseWorker, Design};
 
 use super::case::StudyCase;
@@ -9,7 +9,7 @@ use super::dynamic::dynamic_rows;
 use super::margin::CountedClasses;
 use super::planned::planned_rows;
 use super::rows::StudyColumns;
-use super::static_case::{StaticWorker, invalid_rows};
+use super::static_case::{StaticWorker, rows_without_scenario};
 use crate::ct::{LastScan, scanned};
 
 /// Computes the cases of a study.
@@ -67,7 +67,7 @@ impl CaseWorker for Worker<'_> {
             .scenario(self.study)
             .and_then(|resolved| scanned(resolved, self.study.family.overrides(), &mut self.scan));
         let rows = match scenario {
-            Err(findings) => invalid_rows(&findings),
+            Err(findings) => rows_without_scenario(&findings, layout.mode),
             Ok(resolved) => match layout.mode {
                 StudyMode::Static => self.postures.rows(&resolved),
                 StudyMode::Planned => {

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::study::{FactorValues, ResolvedStudy};
-use needlebench_cell::{Finding, ModelSource, ResolvedScenario, sha256_hex};
+use needlebench_input::{Finding, ModelSource, sha256_hex};
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::study::{FactorValues, ResolvedStudy};
 
 use crate::provenance::{SOURCE_SHA256, provenance};
 
@@ -60,8 +61,8 @@ impl Identity {
                     .changes
                     .iter()
                     .filter(|(_, change)| match change {
-                        needlebench_cell::Change::Set(setting) => setting.number().is_none(),
-                        needlebench_cell::Change::Add(_) => false,
+                        needlebench_scenario::Change::Set(setting) => setting.number().is_none(),
+                        needlebench_scenario::Change::Add(_) => false,
                     })
                     .cloned()
                     .collect();

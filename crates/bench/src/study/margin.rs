@@ -1,18 +1,19 @@
-//! The signed margin of a posture: what searches compare places and tools by.
+//! The constraint margin of a posture: searches compare base placements and tools by it.
 
-use needlebench_cell::{ClearanceClass, ResolvedScenario};
+use needlebench_cell::{ClearanceClass, Rule};
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_evaluation::worst_miss_by_posture_m;
-use needlebench_planning::{Member, Planner, Rule};
+use needlebench_planning::{Member, Planner};
+use needlebench_scenario::ResolvedScenario;
 use needlebench_study::MetricColumn;
 
 /// Name of its column.
 pub const MARGIN_COLUMN: &str = "margin_mm";
 
-/// What a configuration that does not work has at most, m: less than any figure is told apart by, but negative.
+/// Largest margin of an infeasible configuration, m: below the resolution of any value, but negative.
 const NOT_WORKING_M: f64 = -1e-9;
 
-/// Which classes of clearance count with all their room.
+/// The classes of clearance that count in margins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CountedClasses([bool; ClearanceClass::ALL.len()]);
 
@@ -30,22 +31,22 @@ impl CountedClasses {
 impl Default for CountedClasses {
     /// Those of a search that names none.
     fn default() -> Self {
-        let section = needlebench_cell::study::search::SearchSection::default();
+        let section = needlebench_scenario::study::search::SearchSection::default();
         Self::of(|class| section.counts(class))
     }
 }
 
-/// What the column is.
+/// Description of the column.
 pub fn margin_column() -> MetricColumn {
     MetricColumn {
         name: MARGIN_COLUMN.to_owned(),
         key: "margin".to_owned(),
         words: "margin".to_owned(),
-        description: "room that the posture leaves, not negative where the configuration is ok and negative in every \
-                      other row of a layout that can exist: the least of the clearances beyond what is judged of the \
-                      classes that count, and of the distances from singularities; what does not count, and criteria on \
-                      anything else, take part with what they are missed by. Out of reach: how far the arm falls short, \
-                      negative. Sines and radians count 100 mm, mm"
+        description: "constraint margin of the posture: non-negative if the configuration is feasible, negative in every \
+                      other row of a valid layout; the least of the clearances of the counted classes beyond the \
+                      required ones, and of the distances from singularities; other classes, and criteria on other \
+                      quantities, contribute only the amount by which they fail. Out of reach: minus the missing \
+                      distance. A sine of 1 and 1 rad count as 100 mm, mm"
             .to_owned(),
         unit: "mm".to_owned(),
         more_is_better: Some(true),

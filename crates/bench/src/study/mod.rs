@@ -34,4 +34,4 @@ pub use replan::{ReplanControl, ReplanDraw, Replanned, replan_draw, replanned};
 pub use robust::{RobustnessResult, robustness_of};
 pub use rows::{CaseRow, StudyColumns, metric_column};
 pub(crate) use static_case::set_clearances;
-pub use static_case::{StaticWorker, invalid_rows, static_rows};
+pub use static_case::{NO_ENTRY, StaticWorker, rows_without_scenario, static_rows};

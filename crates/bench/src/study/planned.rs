@@ -2,14 +2,14 @@
 
 use std::borrow::Cow;
 
-use needlebench_cell::ResolvedScenario;
-use needlebench_cell::scenario::CriteriaSection;
-use needlebench_cell::study::StudyMode;
 use needlebench_clearance::ClearanceModel;
 use needlebench_evaluation::check_configuration;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 use needlebench_evaluation::room::RoomModel;
 use needlebench_planning::GoalPlan;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::scenario::CriteriaSection;
+use needlebench_scenario::study::StudyMode;
 use needlebench_study::Outcome;
 
 use crate::adjudication::Adjudicated;
@@ -60,10 +60,10 @@ pub(super) fn case_report(
 }
 
 /// The rows of a case by its planned motions: clearances are the least along the motion, of the
-/// final posture where there is none, and the tip is where the balance of torques predicts it.
+/// final posture where there is none, and the tip is predicted from static equilibrium.
 ///
 /// Of the scenario's criteria those are checked that a motion decides: the predicted needle, the error
-/// budget, the room, and clearances by their proven bounds.
+/// budget, the free space, and clearances by their certified bounds.
 ///
 /// # Errors
 /// If the scenario has not exactly one goal, or cannot be planned at all.
@@ -95,8 +95,8 @@ pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[CaseRow; 8], String>
     })))
 }
 
-/// The first criterion, in the order of a run's, that the motion is known to miss, or else that it
-/// could not be judged by.
+/// The first criterion, in the order of a run's, that the motion is known to fail, or else that could
+/// not be evaluated.
 fn missed(
     goal: &str,
     criteria: &CriteriaSection,

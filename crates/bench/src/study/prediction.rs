@@ -1,12 +1,12 @@
 //! Where the needle comes to rest in a posture, without any engine.
 
-use needlebench_cell::imperfections::Imperfections;
-use needlebench_cell::{PlacedPhantom, ResolvedScenario};
 use needlebench_engine::Servo;
 use needlebench_evaluation::{NeedleMeasurement, measure_guide};
 use needlebench_kinematics::Dynamics;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{Candidate, Planner};
+use needlebench_scenario::imperfections::Imperfections;
+use needlebench_scenario::{PlacedPhantom, ResolvedScenario};
 use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, analytic_total};
 use needlebench_uncertainty::{Truth, settle_after};
 
@@ -18,7 +18,7 @@ pub(super) struct Predicted {
     /// One arm and one patient; none where a drive is too weak or nothing tells how joints came to
     /// rest.
     pub needle: Option<NeedleMeasurement>,
-    /// All arms and patients, where a criterion asks for them.
+    /// Over all arms and patients, where a criterion requires it.
     pub budget: Option<ErrorBudget>,
 }
 
@@ -27,7 +27,7 @@ pub(super) struct Prediction<'a> {
     resolved: &'a ResolvedScenario,
     servo: Servo,
     real: Option<Real>,
-    /// What the budget is of, where a criterion asks for one.
+    /// Basis of the error budget, where a criterion requires one.
     expected: Option<&'a Imperfections>,
 }
 
@@ -39,8 +39,8 @@ struct Real {
 }
 
 impl<'a> Prediction<'a> {
-    /// Draws the layout's imperfections, if it has any; the expected error of the tip is computed if it is asked for
-    /// here or by a criterion.
+    /// Samples the layout's imperfections, if it has any; the RMS tip error is computed if it is requested here or
+    /// required by a criterion.
     ///
     /// # Errors
     /// The key at fault.

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use needlebench_cell::Finding;
-use needlebench_cell::study::{FactorValues, ResolvedStudy, StudyLevel, StudyMode};
 use needlebench_engine::ENGINES;
+use needlebench_input::Finding;
+use needlebench_scenario::study::{FactorValues, ResolvedStudy, StudyLevel, StudyMode};
 use needlebench_study::{
     CaseEvaluator, Design, DesignError, FactorKind, Manifest, SCHEMA_VERSION, Shard, Status,
 };

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use needlebench_cell::study::StudyMode;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_input::nothing_serves;
+use needlebench_numerics::random::SplitMix64;
 use needlebench_parallel::in_parallel;
+use needlebench_scenario::study::StudyMode;
 use needlebench_study::statistics::{ChoiceRanking, Gap, ReplannedCase, gaps};
 use needlebench_study::{Outcome, Results, ResultsError};
 use serde::Serialize;
@@ -13,30 +14,31 @@ use serde::Serialize;
 use super::case::StudyCase;
 use super::planned::planned_rows;
 use super::prepare::PreparedStudy;
+use super::static_case::rows_without_scenario;
 use crate::ct::{LastScan, scanned};
 use crate::progress::Progress;
 
-/// Keeps the draw of cases apart from that of the samples, which have the same seed.
+/// Separates the sampling of cases from that of the samples, which have the same seed.
 const STREAM: u64 = 0x7265_706c_616e;
 
-/// Static cases that are drawn to be planned, and how many there are.
+/// Static cases that are sampled to be planned, and how many there are.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ReplanDraw {
     /// The cases, in the order of their numbers, by their postures alone; `planned` is 0 until they are.
     pub cases: Vec<ReplannedCase>,
-    /// Cases that they are drawn from: static ones of layouts that can exist, of the best choice.
+    /// Cases that they are sampled from: static ones of valid layouts, of the best candidate.
     pub of: u64,
 }
 
-/// How much postures alone overstate.
+/// Overestimate of postures only.
 #[derive(Debug, Clone, Serialize)]
 pub struct Replanned {
-    /// Static cases that were planned too, drawn at random.
+    /// Static cases that were also planned, sampled at random.
     pub cases: u64,
-    /// Static cases that they were drawn from, of the best choice where something is to be chosen.
+    /// Static cases that they were sampled from, of the best candidate with control factors.
     pub of: u64,
-    /// Gap of at least one configuration, then of each: share that works by postures less share that does
-    /// with its motions.
+    /// Gap of at least one configuration, then of each: share that is feasible as postures minus share that is feasible
+    /// with motions.
     pub gaps: Vec<Gap>,
     /// The cases: configurations that are ok, as bits, by postures and with motions.
     pub drawn: Vec<ReplannedCase>,
@@ -54,7 +56,7 @@ impl Replanned {
     }
 }
 
-/// Draws the cases that the study asks for, each as likely as any other, by its seed alone.
+/// Samples the cases that the study requests, each equally likely, by its seed alone.
 ///
 /// # Errors
 /// What cannot be read of the table.
@@ -159,20 +161,25 @@ pub struct ReplanControl<'a> {
 /// Configurations that are ok with their motions.
 fn planned_bits(prepared: &PreparedStudy, case: u64) -> Result<u8, String> {
     let layout = StudyCase::new(&prepared.study, &prepared.design, case);
-    let resolved = layout
-        .scenario(&prepared.study)
-        .and_then(|resolved| {
-            scanned(
-                resolved,
-                prepared.study.family.overrides(),
-                &mut LastScan::default(),
-            )
-        })
-        .map_err(|findings| {
+    let resolved = layout.scenario(&prepared.study).and_then(|resolved| {
+        scanned(
+            resolved,
+            prepared.study.family.overrides(),
+            &mut LastScan::default(),
+        )
+    });
+    let rows = match resolved {
+        Ok(resolved) => {
+            planned_rows(&resolved).map_err(|message| format!("case {case}: {message}"))?
+        }
+        Err(findings) if nothing_serves(&findings) => {
+            rows_without_scenario(&findings, StudyMode::Planned)
+        }
+        Err(findings) => {
             let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
-            format!("case {case}: {}", texts.join("; "))
-        })?;
-    let rows = planned_rows(&resolved).map_err(|message| format!("case {case}: {message}"))?;
+            return Err(format!("case {case}: {}", texts.join("; ")));
+        }
+    };
     let ok = rows.iter().enumerate();
     let ok = ok.filter(|(_, row)| row.outcome == Outcome::Ok);
     Ok(ok.fold(0, |bits, (index, _)| bits | 1 << index))

@@ -2,10 +2,10 @@
 
 use std::sync::atomic::AtomicBool;
 
-use needlebench_cell::Finding;
-use needlebench_cell::study::{ResolvedStudy, RobustnessSection};
+use needlebench_input::Finding;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_parallel::in_parallel;
+use needlebench_scenario::study::{ResolvedStudy, RobustnessSection};
 use serde::Serialize;
 
 use super::robustness::{Robustness, RobustnessSettings, robustness};

@@ -1,33 +1,32 @@
 //! Robustness: how far the phantom may be shifted or turned before a configuration breaks.
 //!
-//! The phantom is moved by the keys that place it in a scenario, so every breaking case can be run by
-//! anyone. Two questions are asked:
+//! The phantom is moved by the keys that place it in a scenario, so every failing case can be rerun. Two
+//! questions are answered:
 //!
-//! - *aware*: the plan knows of the move. Goals by entry and target go with the phantom, the posture is
-//!   solved anew, and the configuration breaks where its static case is no longer ok, and no posture is at
-//!   a roll that was ok elsewhere. A goal by a flange pose stays where it is.
-//! - *unaware*: the arm stands where it was when the patient moved; it breaks where a clearance is less
-//!   than the rules or the criteria want.
+//! - *aware*: the move is known to the plan. Goals by entry and target move with the phantom, the posture is
+//!   recomputed, and the configuration breaks where its static case is no longer ok, and no posture is at
+//!   a roll that was ok elsewhere. A goal by a flange pose stays in place.
+//! - *unaware*: the arm stays in place when the patient moves; it breaks where a clearance is less than the
+//!   rules or the criteria require.
 //!
 //! # Method
 //!
-//! What is found is the nearest break of those that were looked at, not a bound: a radius is an upper bound
-//! of the distance within which something breaks, and no proof that nothing does.
+//! The result is the nearest break found: an upper bound of the radius of failure, and no proof that nothing
+//! nearer breaks.
 //!
-//! Along each of a fixed set of directions the first break is looked for in steps of a stated length, and
-//! bisected. Around the directions of the nearest ones a pattern search looks for nearer ones. Then evenly
-//! spread points of the ball within the nearest break are looked at; if one breaks, the search goes on about
-//! it, until a sweep of as many points finds none. How many directions and points there were, and how many of
-//! the last sweep's layouts cannot exist, is part of the result.
+//! Along each of a fixed set of directions the first break is searched for in steps of a stated length, and
+//! bisected. A pattern search around the directions of the nearest ones looks for nearer ones. Then evenly
+//! spread points of the ball within the nearest break are evaluated; if one breaks, the search continues around
+//! it, until a sweep of as many points finds none. The numbers of directions and points, and of invalid layouts
+//! in the last sweep, are part of the result.
 //!
-//! A layout that cannot exist, such as a patient within the table, is neither a break nor a place where
-//! nothing breaks.
+//! An invalid layout, such as a patient within the table, counts neither as a break nor as feasible.
 //!
 //! # How a layout is decided
 //!
 //! By its static case. Most layouts are decided without one: the posture at the roll that was ok last is solved
-//! in closed form, its joints and its needle are judged, and that it keeps its clearances is proven by how far
-//! arm and patient have travelled since distances were measured ([`KnownGaps`](needlebench_clearance::KnownGaps)).
+//! in closed form, its joints and its needle are evaluated, and its clearances are proven by how far arm and
+//! patient have travelled since distances were measured ([`KnownGaps`](needlebench_clearance::KnownGaps)).
 //! What is proven is what the case would say, so all that is reported is the same with
 //! [`by_bounds`](RobustnessSettings::by_bounds) or without.
 
@@ -40,11 +39,12 @@ mod tests;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use needlebench_cell::family::{SHIFT_KEYS, TURN_KEYS};
-use needlebench_cell::{Change, Finding, KeyPath, PhantomMove, ScenarioFamily};
 use needlebench_clearance::ClearanceModel;
+use needlebench_input::Finding;
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::family::{SHIFT_KEYS, TURN_KEYS};
+use needlebench_scenario::{Change, KeyPath, PhantomMove, ScenarioFamily};
 use serde::Serialize;
 
 use layouts::{Layouts, Question};
@@ -54,9 +54,9 @@ use search::{Search, Verdict, nearest_break};
 /// How far and how finely breaks are looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobustnessSettings {
-    /// Farthest shift, mm.
+    /// Largest shift, mm.
     pub max_shift_mm: f64,
-    /// Largest turn, deg.
+    /// Largest rotation, deg.
     pub max_tilt_deg: f64,
     /// Longest stretch of a shift that may go unseen, mm.
     pub step_mm: f64,
@@ -109,7 +109,7 @@ pub struct Breaking {
 /// The smallest move that was found to break a configuration, and how it was searched for.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SmallestFound {
-    /// The break; none where none was found within the limit.
+    /// The break; none if none was found within the limit.
     pub found: Option<Breaking>,
     /// Farthest distance that was looked at, mm or deg.
     pub limit: f64,
@@ -117,20 +117,20 @@ pub struct SmallestFound {
     pub directions: u32,
     /// Evenly spread points within the radius, or the limit, that were looked at last: none breaks.
     pub points: u32,
-    /// Those of them whose layout cannot exist: nothing is known there, because there is nothing.
+    /// Those of them with an invalid layout.
     pub impossible: u32,
-    /// Whether the search came to its end: otherwise nearer breaks were still found when it was given up.
+    /// Whether the search converged: otherwise a smaller value may exist.
     pub settled: bool,
 }
 
 /// How far the phantom may be moved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Robustness {
-    /// Smallest shift found that breaks the configuration, posture solved anew; length of the vector.
+    /// Smallest shift found that breaks the configuration, posture recomputed; length of the vector.
     pub shift: SmallestFound,
     /// Smallest turn found about the vertical and the body's long axis, `sqrt(yaw^2 + roll^2)`.
     pub tilt: SmallestFound,
-    /// The same with the arm left where it stands; none where it stands in no posture at all.
+    /// The same with the arm fixed; none where it has no posture at all.
     pub unaware: Option<Unaware>,
     /// Layouts that were looked at, whether evaluated or decided by proof.
     pub evaluations: u64,
@@ -268,7 +268,7 @@ impl Mover<'_, '_> {
             .is_some_and(|cancel| cancel.load(Ordering::Relaxed))
     }
 
-    /// Where the phantom then lies; of a layout that cannot exist, what was moved alone.
+    /// Where the phantom lies after a move, by key; for an invalid layout the moved keys only.
     fn keys(&self, by: &PhantomMove) -> BTreeMap<String, f64> {
         let moves = self.layouts.moves();
         let section = moves.section_after(by);

@@ -2,11 +2,12 @@
 
 use std::borrow::Cow;
 
-use needlebench_cell::study::StudyMode;
+use needlebench_cell::Rule;
 use needlebench_evaluation::metric::{self, MetricKey};
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_planning::{Rejection, Rule};
+use needlebench_planning::Rejection;
+use needlebench_scenario::study::StudyMode;
 use needlebench_study::{Measure, MetricColumn, Outcome, Row};
 
 use super::margin::margin_column;
@@ -22,7 +23,7 @@ pub struct CaseRow {
     pub mode: StudyMode,
     /// What was measured; of a static case, of its posture.
     pub measured: ConfigurationReport,
-    /// The signed margin of a static case's posture, m.
+    /// The constraint margin of a static case's posture, m.
     pub margin_m: Option<f64>,
 }
 
@@ -76,7 +77,7 @@ impl StudyColumns {
         self
     }
 
-    /// With the signed margin, as the last one.
+    /// With the constraint margin, as the last one.
     pub fn with_margin(mut self) -> Self {
         self.has_margin = true;
         self

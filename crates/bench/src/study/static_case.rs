@@ -2,14 +2,16 @@
 
 use std::borrow::Cow;
 
-use needlebench_cell::study::StudyMode;
-use needlebench_cell::{ClearanceClass, Finding, ResolvedScenario};
+use needlebench_cell::ClearanceClass;
 use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_evaluation::first_missed_by_posture;
 use needlebench_evaluation::report::ConfigurationReport;
+use needlebench_input::{Finding, nothing_serves};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::{Configuration, Kinematics};
 use needlebench_planning::{Member, Planner, needle_route, route_rejection};
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::study::StudyMode;
 use needlebench_study::Outcome;
 
 use super::margin::{CountedClasses, margin_m};
@@ -29,10 +31,10 @@ const KEPT: usize = 8;
 /// For a fixed roll the posture is the one of the inverse kinematics, for a free one that which a plan
 /// tries first ([`Planner::postures`]). Clearances, margins and rules are those of the nominal arm in
 /// that posture, as in `needlebench atlas`; joint positions lie in (-180, 180] deg. A configuration
-/// that breaks no rule is then judged by those of the scenario's criteria that a posture decides.
+/// that no rule rejects is then evaluated by those of the scenario's criteria that a posture decides.
 ///
 /// With `[imperfections]` the needle is where one draw of them, made from the scenario's seed as in a
-/// run, settles by the balance of torques. Friction needs to know how the joints came to rest: it is
+/// run, settles in static equilibrium. Friction needs to know how the joints came to rest: it is
 /// that of the straight approach along the needle alone, after which nothing remembers the motion
 /// before; where there is no such line there is no prediction.
 #[derive(Debug, Default)]
@@ -43,7 +45,7 @@ pub struct StaticWorker {
     kinematics: Option<Kinematics>,
     /// Classes that count in margins.
     counted: CountedClasses,
-    /// Whether the expected error of the tip is wanted without a criterion, too.
+    /// Whether the RMS tip error is computed without a criterion, too.
     expects_tip: bool,
 }
 
@@ -54,21 +56,24 @@ pub fn static_rows(resolved: &ResolvedScenario) -> [CaseRow; 8] {
     StaticWorker::default().rows(resolved)
 }
 
-/// Rows of a layout that cannot exist; the key at fault is the detail.
-pub fn invalid_rows(findings: &[Finding]) -> [CaseRow; 8] {
-    let key = findings.iter().find_map(|finding| finding.key.clone());
-    invalid(&key.unwrap_or_else(|| "scenario".to_owned()))
+/// The detail of a layout in which no entry is feasible for the goal, though all were tried.
+pub const NO_ENTRY: &str = "no_entry";
+
+/// Rows of a layout without a scenario. No configuration is feasible where no entry is; otherwise the layout is
+/// invalid, and the key at fault is the detail.
+pub fn rows_without_scenario(findings: &[Finding], mode: StudyMode) -> [CaseRow; 8] {
+    let (outcome, detail) = if nothing_serves(findings) {
+        (Outcome::Rejected, NO_ENTRY)
+    } else {
+        let key = findings.iter().find_map(|finding| finding.key.as_deref());
+        (Outcome::Invalid, key.unwrap_or("scenario"))
+    };
+    rows_alike(mode, outcome, detail)
 }
 
-fn invalid(key: &str) -> [CaseRow; 8] {
-    Configuration::ALL.map(|configuration| {
-        CaseRow::new(
-            configuration,
-            StudyMode::Static,
-            Outcome::Invalid,
-            key.to_owned(),
-        )
-    })
+fn rows_alike(mode: StudyMode, outcome: Outcome, detail: &str) -> [CaseRow; 8] {
+    Configuration::ALL
+        .map(|configuration| CaseRow::new(configuration, mode, outcome, detail.to_owned()))
 }
 
 impl StaticWorker {
@@ -80,7 +85,7 @@ impl StaticWorker {
         }
     }
 
-    /// Computes the expected error of the tip without a criterion, too.
+    /// Computes the RMS tip error without a criterion, too.
     pub fn expecting_tip(self, expects_tip: bool) -> Self {
         Self {
             expects_tip,
@@ -105,7 +110,7 @@ impl StaticWorker {
                 )
             })
         })
-        .unwrap_or_else(invalid)
+        .unwrap_or_else(|key| rows_alike(StudyMode::Static, Outcome::Invalid, key))
     }
 
     /// One of [`StaticWorker::rows`].

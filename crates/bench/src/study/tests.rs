@@ -2,20 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use needlebench_cell::study::{
-    Distribution, FactorValues, Role, SamplingMethod, StudyFactor, StudyMode,
-};
-use needlebench_cell::{
-    Change, ClearanceClass, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting,
-};
+use needlebench_cell::ClearanceClass;
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{Planner, needle_route};
+use needlebench_scenario::study::{
+    Distribution, FactorValues, Role, SamplingMethod, StudyFactor, StudyMode,
+};
+use needlebench_scenario::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting};
 use needlebench_study::{Design, FactorValue, Outcome};
 
 use super::robustness::{RESOLUTION, RobustnessSettings, robustness};
-use super::{CaseRow, StaticWorker, StudyColumns, invalid_rows, static_rows};
+use super::{CaseRow, StaticWorker, StudyColumns, rows_without_scenario, static_rows};
 use crate::real_cell::RealCell;
 
 fn family(name: &str) -> ScenarioFamily {
@@ -223,7 +222,8 @@ fn a_layout_that_cannot_exist_names_its_key() {
     let family = family("supine_suite");
     let goal = family.goals().next().unwrap();
     let changes = [set("phantom.position_mm[1]", 900.0)];
-    let rows = invalid_rows(&family.vary(goal, &changes).unwrap_err());
+    let findings = family.vary(goal, &changes).unwrap_err();
+    let rows = rows_without_scenario(&findings, StudyMode::Static);
     for (index, row) in rows.iter().enumerate() {
         assert_eq!(row.measured.label, Configuration::ALL[index].label());
         assert_eq!(row.outcome, Outcome::Invalid);

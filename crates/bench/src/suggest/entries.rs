@@ -2,23 +2,23 @@
 //!
 //! # How they are found
 //!
-//! 1. Directions from the target, 3 deg apart all round, are placed as a scenario with such a goal is: the needle has to
-//!    be long enough, nothing may stand where guide and needle are, it may not enter at the ends of the chest, where the
-//!    phantom lacks clavicles and vessels, nor be oblique to the skin by more than 60 deg, and has to keep its margins to
-//!    bone, vessels and organs.
+//! 1. Directions from the target, 3 deg apart all round, are placed as a scenario with such a goal is: the needle has
+//!    to be long enough, nothing may stand where guide and needle are, it may not enter at the ends of the chest, where
+//!    the phantom lacks clavicles and vessels, nor be oblique to the skin by more than 60 deg, and has to keep its
+//!    margins to bone, vessels and organs.
 //! 2. Those that are left are ordered by score. From the best on, each is moved by up to 2 deg to where its score is
-//!    best, and is looked at with the robot: as many configurations as the scenario wants have to work, by the code of
+//!    best, and is looked at with the robot: as many configurations as the scenario wants are feasible, by the code of
 //!    `check`. Entries nearer than 15 mm to a better one are left out, those near one where the robot fails too.
 //! 3. What works is ordered by its score with the robot's term.
 
 use std::f64::consts::FRAC_PI_3;
 
 use nalgebra::Point3;
-use needlebench_cell::scenario::GoalSection;
-use needlebench_cell::{Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction};
 use needlebench_clearance::ClearanceModel;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::{Planner, crossed_fissures, judged_tissues};
+use needlebench_scenario::scenario::GoalSection;
+use needlebench_scenario::{Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction};
 use needlebench_study::Outcome;
 use serde::Serialize;
 
@@ -34,7 +34,7 @@ const APART_M: f64 = 0.015;
 const FAILED_APART_M: f64 = 0.008;
 /// Entries that are looked at together, whatever the number of threads.
 const BATCH: usize = 8;
-/// Entries that the robot is asked for at most: where so many fail, the robot stands elsewhere.
+/// Most entries that the robot is checked for: where so many fail, the base placement is unsuitable.
 const MOST_ASKED: usize = 64;
 /// Part of the skin's normal along the body beyond which the skin is that of an end of the chest: neck, shoulders or
 /// waist begin there, which the phantom does not have (assumed: 45 deg).
@@ -45,7 +45,7 @@ const HIGHEST: f64 = 0.5;
 /// Largest angle between needle and the skin's normal, rad: beyond it a needle slips along the skin (assumed).
 const STEEPEST_RAD: f64 = FRAC_PI_3;
 
-/// A term of the score: a straight line between a value that is worth nothing and one that is worth all.
+/// A term of the score: linear from utility 0 at `worst` to utility 1 at `best`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct TermScale {
     name: &'static str,
@@ -90,11 +90,9 @@ const SCALES: [TermScale; 5] = [
 ];
 
 /// What the score is made of, for people.
-pub const ENTRY_TERMS: &str = "\
-score: 100 times the mean of depth (1 at 40 mm, 0 at 140), margin to spare beyond
-  what is kept from bone, vessels and organs (1 at 5 mm), angle to the skin's normal
-  (1 at 0 deg, 0 at 60), fissures crossed (half weight), and configurations
-  that work";
+pub const ENTRY_TERMS: &str = "score: 100 times the mean of depth (1 at 40 mm, 0 at 140), clearance in excess of the \
+     required margins from bone, vessels and organs (1 at 5 mm), angle to the skin normal (1 at 0 \
+     deg, 0 at 60), fissures crossed (half weight), and feasible configurations";
 
 /// A term of one entry's score.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -114,7 +112,7 @@ pub struct EntryTerm {
 pub enum EntryRule {
     /// The needle does not reach from the guide to the target.
     NeedleTooShort,
-    /// Guide or entry would be in something, or the goal is refused otherwise.
+    /// Guide or entry collides, or the goal is invalid otherwise.
     Blocked,
     /// Near the neck, a shoulder or the waist, where the phantom lacks what a needle could meet.
     End,
@@ -161,13 +159,13 @@ impl EntryRule {
     pub fn in_words(self) -> &'static str {
         match self {
             Self::NeedleTooShort => "needle too short",
-            Self::Blocked => "guide in the table or other things",
-            Self::End => "at neck, shoulder or waist, of which the phantom lacks parts",
-            Self::Oblique => "more than 60 deg from the skin's normal",
-            Self::Bone => "bone in the way",
-            Self::Vessel => "vessel in the way",
-            Self::Organ => "another organ in the way",
-            Self::Robot => "robot fails",
+            Self::Blocked => "guide collides with table or objects",
+            Self::End => "at neck, shoulder or waist, where the phantom is incomplete",
+            Self::Oblique => "more than 60 deg from the skin normal",
+            Self::Bone => "bone on the path",
+            Self::Vessel => "vessel on the path",
+            Self::Organ => "another organ on the path",
+            Self::Robot => "infeasible for the robot",
         }
     }
 
@@ -195,7 +193,7 @@ pub struct TissueMargin {
     pub part: String,
     /// Distance of the needle's surface, m.
     pub distance_m: f64,
-    /// The least that it has to be, m.
+    /// The required distance, m.
     pub margin_m: f64,
 }
 
@@ -216,9 +214,9 @@ pub struct Entry {
     pub margins: Vec<TissueMargin>,
     /// Fissures of the lungs that it crosses.
     pub fissures_crossed: Vec<String>,
-    /// Configurations that work there, by their final postures.
+    /// Configurations that are feasible there, by their final postures.
     pub working: usize,
-    /// All eight: which work, and why others do not.
+    /// All eight: which are feasible, and why the others are not.
     pub configurations: Vec<ConfigurationPreview>,
     /// Configurations that also have a motion that meets the criteria, if motions were planned.
     pub working_planned: Option<usize>,
@@ -243,15 +241,15 @@ pub struct EntrySearch {
     pub base_position_m: [f64; 3],
     /// Directions that were tried.
     pub tried: usize,
-    /// Of these, with a needle's route that is allowed.
+    /// Of these, with an admissible needle path.
     pub allowed: usize,
-    /// Rules that refused the others, the most frequent first.
+    /// Rules that rejected the others, the most frequent first.
     pub refused: Vec<Refused>,
-    /// Allowed entries that the robot was asked for.
+    /// Admissible entries that the robot was checked for.
     pub asked: usize,
-    /// Of these, where too few configurations work; by the rule that rejects most of them.
+    /// Of these, those with too few feasible configurations, by the rule that rejects most of them.
     pub robot_refused: Vec<Refused>,
-    /// Configurations that have to work.
+    /// Required number of feasible configurations.
     pub wanted: usize,
     /// The proposals, the best first.
     pub entries: Vec<Entry>,
@@ -571,7 +569,7 @@ impl Asked {
     }
 }
 
-/// Asks the robot for the best entries, until as many as wanted work or it has failed often.
+/// Checks the robot for the best entries, until as many as required are feasible or it has failed often.
 fn ask_robot(
     judge: &Judge<'_>,
     allowed: &[Allowed],
@@ -582,7 +580,7 @@ fn ask_robot(
     let resolved = judge.resolved;
     let model = ClearanceModel::new(&resolved.cell);
     let planner = Planner::new(resolved, &model)
-        .map_err(|error| SuggestError::refused(error.to_string(), "only UR arms can be asked"))?;
+        .map_err(|error| SuggestError::refused(error.to_string(), "only UR arms can be checked"))?;
     control.progress.message("configurations");
     let mut answers: Vec<Answer> = Vec::new();
     let mut next = 0;
@@ -687,7 +685,8 @@ impl EntrySearch {
             let most = self.refused.first();
             let rule = most.and_then(|most| EntryRule::of_name(&most.rule));
             return format!(
-                "of {} directions none has an allowed needle's route; most often: {} ({})",
+                "none of {} directions has an admissible needle path; most frequent reason: {} \
+                 ({})",
                 self.tried,
                 rule.map_or("", EntryRule::in_words),
                 most.map_or(0, |most| most.count),
@@ -695,8 +694,8 @@ impl EntrySearch {
         }
         let most = self.robot_refused.first();
         format!(
-            "{} of {} needle's routes are allowed, but at the {} best and apart of them fewer than {} of 8 \
-             configurations work; most often: {}",
+            "{} of {} needle paths are admissible, but of the {} best distinct ones none is \
+             feasible in {} of 8 configurations; most frequent reason: {}",
             self.allowed,
             self.tried,
             self.asked,

@@ -1,8 +1,8 @@
-//! What is tried: directions about a target, and places about a patient.
+//! What is tried: directions about a target, and base placements about a patient.
 
-use needlebench_cell::ResolvedScenario;
-use needlebench_cell::scenario::MountKind;
 use needlebench_kinematics::{NotUrGeometry, UrGeometry};
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::scenario::MountKind;
 
 /// Step between directions, deg: 3 mm on skin that is 60 mm away.
 const STEP_DEG: f64 = 3.0;
@@ -51,7 +51,7 @@ fn in_half_turn(degrees: f64) -> f64 {
     }
 }
 
-/// A place of the base.
+/// A base placement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct BasePlace {
     pub position_mm: [f64; 3],

@@ -1,8 +1,8 @@
 //! Proposals for a scenario: where a needle may enter for a target, and where the robot may stand for its goals.
 //!
-//! Both are found on a stated grid, judged by the code that `check` and static cases of studies have, and ranked by
-//! stated terms: nothing here has rules of its own about routes or clearances. Postures only are judged, unless motions
-//! are asked for.
+//! Both are found on a stated grid, evaluated by the code that `check` and static cases of studies have, and ranked by
+//! stated terms: nothing here has rules of its own about routes or clearances. Only postures are evaluated, unless
+//! motions are requested.
 
 mod entries;
 mod grid;
@@ -10,7 +10,8 @@ mod places;
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::{Finding, reason_in_words};
+use needlebench_cell::reason_in_words;
+use needlebench_input::Finding;
 use serde::Serialize;
 
 use crate::Stop;
@@ -62,12 +63,12 @@ impl SuggestError {
     }
 }
 
-/// How many of what was tried a rule refused.
+/// How many of the tried ones a rule rejected.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Refused {
     /// The rule.
     pub rule: String,
-    /// How many it refused.
+    /// How many it rejected.
     pub count: usize,
 }
 

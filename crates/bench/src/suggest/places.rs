@@ -1,17 +1,18 @@
-//! Where the robot may stand for the goals of a scenario.
+//! Base placements that are feasible for the goals of a scenario.
 //!
-//! Places on a grid about the patient, in whole centimetres, are judged as static cases of a study are: a place that
-//! cannot be is refused by what it breaks, one where a goal has fewer working configurations than the scenario wants by
-//! the rule that rejects most of them. The others are ordered by their worst goal: first by how many configurations work
-//! there, then by the clearance of its best configuration's arm from its surroundings. Proposals are 100 mm apart.
+//! Placements on a grid about the patient, in whole centimetres, are evaluated as static cases of a study are. An
+//! invalid placement is refused with what makes it invalid; one where a goal has fewer feasible configurations than the
+//! scenario requires, with the rule that rejects most of them. The others are ordered by their worst goal: first by its
+//! number of feasible configurations, then by the clearance of its best configuration's arm from the surroundings.
+//! Proposals are at least 100 mm apart.
 
 use std::sync::atomic::Ordering;
 
 use nalgebra::Vector3;
-use needlebench_cell::{
-    Change, ClearanceClass, Finding, KeyPath, ResolvedScenario, ScenarioFamily, Setting,
-};
+use needlebench_cell::ClearanceClass;
+use needlebench_input::Finding;
 use needlebench_parallel::in_parallel;
+use needlebench_scenario::{Change, KeyPath, ResolvedScenario, ScenarioFamily, Setting};
 use needlebench_study::Outcome;
 use serde::Serialize;
 
@@ -32,7 +33,7 @@ const RUN: usize = 4;
 pub struct PlaceGoal {
     /// Its name.
     pub goal: String,
-    /// Configurations that work there, by their final postures.
+    /// Configurations that are feasible there, by their final postures.
     pub working: usize,
     /// That of them with the largest clearance.
     pub best: String,
@@ -59,7 +60,7 @@ pub struct Place {
     pub rpy_deg: [f64; 3],
     /// Goal by goal.
     pub goals: Vec<PlaceGoal>,
-    /// Configurations that work for the goal with fewest.
+    /// Feasible configurations of the goal with fewest.
     pub working: usize,
     /// Clearance of the goal with least, m.
     pub clearance_m: Option<f64>,
@@ -70,26 +71,26 @@ pub struct Place {
 pub struct PlaceSample {
     /// Position of the base, mm.
     pub position_mm: [f64; 3],
-    /// Configurations that work for the goal with fewest; none for a place that cannot be.
+    /// Feasible configurations of the goal with fewest; none for an invalid placement.
     pub working: Option<usize>,
 }
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlaceSearch {
-    /// Names of the goals that a place has to serve.
+    /// Names of the goals that a placement must be feasible for.
     pub goals: Vec<String>,
     /// What the judgement rests on.
     pub basis: &'static str,
     /// Places that were tried.
     pub tried: usize,
-    /// Of these, that serve all goals.
+    /// Of these, feasible for all goals.
     pub allowed: usize,
-    /// What refused the others, the most frequent first.
+    /// What rejected the others, the most frequent first.
     pub refused: Vec<Refused>,
-    /// Configurations that have to work.
+    /// Required number of feasible configurations.
     pub wanted: usize,
-    /// The place that the scenario has, judged likewise; none if it cannot be or does not serve all goals.
+    /// The place that the scenario has, judged likewise; none if it is invalid or infeasible for a goal.
     pub present: Option<Place>,
     /// The proposals, the best first.
     pub places: Vec<Place>,
@@ -123,7 +124,7 @@ pub fn suggest_places(
         .map_err(|error| SuggestError::refused(error.to_string(), "only UR arms can be placed"))?;
     if tried.is_empty() {
         return Err(SuggestError::refused(
-            "there is no patient to stand beside",
+            "no patient to place the base beside",
             "add a [phantom] section",
         ));
     }
@@ -191,7 +192,7 @@ pub fn suggest_places(
     })
 }
 
-/// Goals that no place can help are refused before anything is tried.
+/// Goals that are infeasible from every placement are rejected before anything is tried.
 fn check_goals(base: &ResolvedScenario, goals: &[String]) -> Result<(), SuggestError> {
     for goal in &base.goals {
         if !goals.contains(&goal.name) {
@@ -205,7 +206,7 @@ fn check_goals(base: &ResolvedScenario, goals: &[String]) -> Result<(), SuggestE
         if section.is_some_and(|section| section.flange_pose.is_some()) {
             return Err(SuggestError::refused(
                 format!(
-                    "goal `{}` is a pose of the flange, which moves with the base",
+                    "goal `{}` is a flange pose, which moves with the base",
                     goal.name
                 ),
                 "give it an entry and a target",
@@ -213,8 +214,11 @@ fn check_goals(base: &ResolvedScenario, goals: &[String]) -> Result<(), SuggestE
         }
         if let Some(route) = needlebench_planning::route_rejection(base, goal) {
             return Err(SuggestError::refused(
-                format!("no place serves goal `{}`: {}", goal.name, route.detail),
-                "ask for entries first: --entries",
+                format!(
+                    "no base placement is feasible for goal `{}`: {}",
+                    goal.name, route.detail
+                ),
+                "request entries first: --entries",
             ));
         }
     }
@@ -353,14 +357,14 @@ fn changes(place: &BasePlace) -> Vec<(KeyPath, Change)> {
     ]
 }
 
-/// Why a place cannot be, without its numbers: to be counted.
+/// Why a placement is invalid, without its numbers: to be counted.
 fn in_words(findings: &[Finding]) -> String {
     let key = findings.iter().find_map(|finding| finding.key.as_deref());
     match key {
-        Some("robot.base_position_mm") => "base or mount would stand in something".to_owned(),
-        Some("start.joints_deg") => "the start posture is refused".to_owned(),
-        Some(key) => format!("`{key}` is refused"),
-        None => "it cannot be".to_owned(),
+        Some("robot.base_position_mm") => "base or mount collides".to_owned(),
+        Some("start.joints_deg") => "invalid start posture".to_owned(),
+        Some(key) => format!("invalid `{key}`"),
+        None => "invalid layout".to_owned(),
     }
 }
 
@@ -438,7 +442,8 @@ impl PlaceSearch {
     pub fn why_none(&self) -> String {
         let most = self.refused.first();
         format!(
-            "of {} places about the patient none serves {}; most often: {} ({})",
+            "none of {} base placements around the patient is feasible for {}; most frequent \
+             reason: {} ({})",
             self.tried,
             if self.goals.len() == 1 {
                 "the goal"

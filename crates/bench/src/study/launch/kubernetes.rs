@@ -1,6 +1,6 @@
 //! A job with indices of Kubernetes.
 
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 
 use super::{Launch, LaunchFile, SHARDS, Texts, is_below};
 
@@ -17,10 +17,10 @@ pub(super) fn job(launch: &Launch, texts: &Texts) -> Result<LaunchFile, Finding>
         if !is_below(path) {
             return Err(Finding::new(
                 path.display().to_string(),
-                format!("{what} has to be below this folder, which the pods see as {MOUNT}"),
+                format!("{what} must be inside this folder, which the pods mount as {MOUNT}"),
             )
             .key("--launch")
-            .hint("go to the folder that is on the shared volume, and give paths from there"));
+            .hint("change to the folder on the shared volume, and give paths relative to it"));
         }
     }
     // Kubernetes would put variables in the place of `$(NAME)`.
@@ -48,7 +48,7 @@ pub(super) fn job(launch: &Launch, texts: &Texts) -> Result<LaunchFile, Finding>
         .iter()
         .map(|argument| format!("            - {argument}\n"))
         .collect();
-    let head = texts.head("", "A job of Kubernetes: one pod for each shard.");
+    let head = texts.head("", "A Kubernetes job: one pod per shard.");
     // Its first line is for shells.
     let head = head.split_once('\n').map_or("", |(_, rest)| rest);
     let (name, count, jobs) = (name(launch.name), launch.request.shards, launch.jobs);
@@ -57,8 +57,8 @@ pub(super) fn job(launch: &Launch, texts: &Texts) -> Result<LaunchFile, Finding>
     Ok(LaunchFile {
         name: "job.yaml",
         text: format!(
-            r#"{head}# Two names are yours to set: the image (Containerfile makes one), and the claim of a volume that all pods
-# may write to (ReadWriteMany) and that holds the folder in which you asked for this.
+            r#"{head}# Set two names: the image (built from Containerfile), and the claim of a volume (ReadWriteMany) that all pods can
+# write to and that holds the folder in which this file was requested.
 apiVersion: batch/v1
 kind: Job
 metadata:
@@ -67,17 +67,17 @@ spec:
   completionMode: Indexed
   completions: {count}
   parallelism: {count}
-  # Of each shard by itself.
+  # For each shard separately.
   backoffLimitPerIndex: 20
   podFailurePolicy:
     rules:
-      # Bad input: never again.
+      # Invalid input: no retry.
       - action: FailIndex
         onExitCodes:
           containerName: shard
           operator: In
           values: [2]
-      # A node that is lost, an eviction, a preemption: not the shard's fault.
+      # Lost node, eviction or preemption: not counted as a failure of the shard.
       - action: Ignore
         onPodConditions:
           - type: DisruptionTarget
@@ -85,7 +85,7 @@ spec:
   template:
     spec:
       restartPolicy: Never
-      # Asked to stop, a shard keeps what it has.
+      # A stopped shard saves its results.
       terminationGracePeriodSeconds: 120
       containers:
         - name: shard

@@ -6,24 +6,24 @@ use super::{Launch, LaunchFile, Texts};
 /// How often a shard is started again.
 const RESTARTS: u32 = 20;
 
-/// Runs all shards at the same time, each again until it is there.
+/// Runs all shards in parallel, each again until it is complete.
 pub(super) fn run(launch: &Launch, texts: &Texts) -> LaunchFile {
     let head = texts.head(
         "/bin/bash",
-        "Runs all shards at the same time, each in a process that is started again where that may help.",
+        "Runs all shards in parallel, each in its own process; restarts a shard after a transient failure.",
     );
     let shards = launch.request.shards;
     let shard = quoted(&texts.absolute("shard.sh"));
     let logs = quoted(&texts.absolute("logs"));
     let merge = quoted(&texts.absolute("merge.sh"));
-    let merge = quoted(&format!("all shards are there: sh {merge}"));
+    let merge = quoted(&format!("all shards are complete: sh {merge}"));
     LaunchFile {
         name: "run.sh",
         text: format!(
             r#"{head}logs={logs}
 mkdir -p "$logs" || exit 3
 
-# One shard, until it is there or there is no hope.
+# One shard, until it is complete or fails permanently.
 run() {{
     stopped=no
     child=
@@ -41,13 +41,13 @@ run() {{
             wait "$child"
             status=$?
         done
-        # 0 is done and 2 is for good; 126 and 127: there is no such program.
+        # 0: complete; 2: permanent failure; 126 and 127: program not found.
         case $status in 0 | 2 | 126 | 127) break ;; esac
         sleep 1
     done
     case $status in
         0 | 130) ;;
-        *) echo "shard $1 has ended with $status: $logs/$1.log" >&2 ;;
+        *) echo "shard $1 ended with status $status: $logs/$1.log" >&2 ;;
     esac
     exit "$status"
 }}
@@ -71,7 +71,7 @@ for child in $children; do
     [ "$status" -gt "$worst" ] && worst=$status
 done
 [ "$stopped" = no ] || {{
-    echo "interrupted: started again it goes on" >&2
+    echo "interrupted: run this script again to continue" >&2
     exit 130
 }}
 [ "$worst" = 0 ] && echo {merge}

@@ -12,7 +12,7 @@ use std::path::{Component, Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 
 use super::prepare::in_words;
 use shell::quoted;
@@ -59,7 +59,7 @@ impl FromStr for LaunchRequest {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let expected = || {
             format!(
-                "\"{text}\" is no launcher with a number of shards: expected slurm:N, kubernetes:N or local:N, such as slurm:400"
+                "\"{text}\" is not a launcher with a number of shards: expected slurm:N, kubernetes:N or local:N, such as slurm:400"
             )
         };
         let (name, shards) = text.split_once(':').ok_or_else(expected)?;
@@ -125,12 +125,12 @@ impl LaunchFile {
     }
 }
 
-/// What somebody types, and what for.
+/// A command line of the launch, and its purpose.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LaunchStep {
     /// What it does: `start`, `missing`, `merge` ...
     pub does: &'static str,
-    /// The line to type.
+    /// The command line.
     pub line: String,
 }
 
@@ -139,13 +139,13 @@ pub struct LaunchStep {
 pub struct LaunchPlan {
     /// Folder of the files, from where the request was made.
     pub folder: PathBuf,
-    /// Folders that have to be there before it starts.
+    /// Folders that must exist before it starts.
     pub folders: Vec<PathBuf>,
     /// The files.
     pub files: Vec<LaunchFile>,
-    /// Names of files of other launches, which would not go with these.
+    /// Names of files of other launches, which do not match these.
     pub stale: Vec<&'static str>,
-    /// What to type, in this order.
+    /// The command lines, in this order.
     pub steps: Vec<LaunchStep>,
 }
 
@@ -163,7 +163,7 @@ const FILES: [&str; 7] = [
 /// Folder of a study's shards, in the study's own.
 const SHARDS: &str = "shards";
 
-/// Makes the files of a launch, and the lines to type.
+/// Makes the files of a launch, and the command lines.
 ///
 /// # Errors
 /// A path that the launcher cannot have.
@@ -188,11 +188,11 @@ pub fn launch_plan(launch: &Launch) -> Result<LaunchPlan, Finding> {
                 line: format!("sbatch {}", texts.file("job.sh")),
             });
             steps.push(texts.status_step());
-            steps.push(texts.step("start what is missing", "missing.sh"));
+            steps.push(texts.step("start missing shards", "missing.sh"));
         }
         Launcher::Local => {
             files.push(local::run(launch, &texts));
-            steps.push(texts.step("start, or go on", "run.sh"));
+            steps.push(texts.step("start, or continue", "run.sh"));
             steps.push(texts.status_step());
         }
         Launcher::Kubernetes => {
@@ -200,7 +200,7 @@ pub fn launch_plan(launch: &Launch) -> Result<LaunchPlan, Finding> {
             files = vec![kubernetes::job(launch, &texts)?];
             folders = vec![texts.shards_folder.clone()];
             steps = vec![LaunchStep {
-                does: "start, once image and claimName are yours",
+                does: "start, after setting image and claimName",
                 line: format!("kubectl apply --filename {}", texts.file("job.yaml")),
             }];
             steps.push(texts.status_step());
@@ -249,10 +249,10 @@ impl<'a> Texts<'a> {
             text.map(quoted).ok_or_else(|| {
                 Finding::new(
                     path.display().to_string(),
-                    format!("{what} has a name that no script can have"),
+                    format!("{what}: this name cannot be used in a script"),
                 )
                 .key("--launch")
-                .hint("names of UTF-8 without line ends")
+                .hint("use a UTF-8 name without line breaks")
             })
         };
         let options = launch
@@ -308,12 +308,12 @@ impl<'a> Texts<'a> {
             name: "shard.sh",
             text: format!(
                 "{}{}\
-                 # The program itself gets signals. It may be killed at any time and started again.\n\
+                 # Signals go to the program itself. It may be killed at any time and started again.\n\
                  exec {program} study {study} --shard auto --out {shards} \\\n    \
                  --resume --yes --quiet --jobs {}{options}\n",
                 self.head(
                     "/bin/sh",
-                    "One shard; NEEDLEBENCH_SHARD or the scheduler says which."
+                    "One shard; NEEDLEBENCH_SHARD or the scheduler selects it."
                 ),
                 self.environment(),
                 self.launch.jobs,
@@ -334,7 +334,7 @@ impl<'a> Texts<'a> {
             name: "merge.sh",
             text: format!(
                 "{}{}exec {program} merge {study} {shards} --out {out}{options} \"$@\"\n",
-                self.head("/bin/sh", "Joins the shards, once they are all there."),
+                self.head("/bin/sh", "Merges the shards when all are complete."),
                 self.environment(),
             ),
         }
@@ -348,7 +348,7 @@ impl<'a> Texts<'a> {
                 "{}{}exec {program} doctor --prepare \"$@\"\n",
                 self.head(
                     "/bin/sh",
-                    "Makes MuJoCo's environment ahead, where there is a network."
+                    "Sets up the MuJoCo environment in advance; requires a network connection."
                 ),
                 self.environment(),
             ),
@@ -375,7 +375,7 @@ impl<'a> Texts<'a> {
 
     fn status_step(&self) -> LaunchStep {
         LaunchStep {
-            does: "see how far it is",
+            does: "show progress",
             line: format!(
                 "needlebench study {} --status {}{}",
                 self.study, self.shards, self.options
@@ -390,7 +390,7 @@ fn is_below(path: &Path) -> bool {
         .all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
 }
 
-/// A shard that takes less is not worth its start.
+/// Least recommended duration of a shard.
 fn least_worth(launcher: Launcher) -> Duration {
     match launcher {
         // About a second of the scheduler's for each, one after the other.
@@ -403,7 +403,7 @@ fn least_worth(launcher: Launcher) -> Duration {
 /// Slurm's `MaxArraySize` where nobody has set it: indices are below it.
 const SLURM_ARRAY: u32 = 1001;
 
-/// What is worth changing in a request, from the time that a case takes on one thread.
+/// Recommended changes of a request, from the time that a case takes on one thread.
 pub fn advice(request: LaunchRequest, cases: u64, jobs: u16, each: Duration) -> Vec<String> {
     let mut advice = Vec::new();
     let shards = f64::from(request.shards);
@@ -413,8 +413,8 @@ pub fn advice(request: LaunchRequest, cases: u64, jobs: u16, each: Duration) -> 
     if shard < least && request.shards > 1 {
         let worth = (total.as_secs_f64() / least.as_secs_f64()).floor().max(1.0);
         advice.push(format!(
-            "a shard takes about {}, and {} worth starting takes {}: ask for {worth}, or for as many as you have \
-             workers if those are more",
+            "a shard takes about {}; {} should take at least {}: use {worth} shards, or one per worker if you have \
+             more workers",
             in_words(shard),
             match request.launcher {
                 Launcher::Slurm => "a job",
@@ -426,7 +426,7 @@ pub fn advice(request: LaunchRequest, cases: u64, jobs: u16, each: Duration) -> 
     }
     if request.launcher == Launcher::Slurm && request.shards >= SLURM_ARRAY {
         advice.push(format!(
-            "Slurm takes arrays below MaxArraySize, {SLURM_ARRAY} if nobody has changed it: \
+            "Slurm limits array indices to below MaxArraySize (default {SLURM_ARRAY}): \
              `scontrol show config | grep MaxArraySize`"
         ));
     }

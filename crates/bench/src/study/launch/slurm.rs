@@ -1,6 +1,6 @@
 //! An array of jobs of Slurm.
 
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 
 use super::shell::quoted;
 use super::{Launch, LaunchFile, Texts};
@@ -14,7 +14,8 @@ pub(super) fn job(launch: &Launch, texts: &Texts) -> Result<LaunchFile, Finding>
     // Not a path any more: Slurm would take `%a` for itself.
     if logs.contains('\\') {
         return Err(
-            Finding::new(logs, "Slurm writes to no file with a \\ in its name").key("--launch"),
+            Finding::new(logs, "Slurm cannot write to a file with a \\ in its name")
+                .key("--launch"),
         );
     }
     let (folder, file) = logs.rsplit_once('/').unwrap_or(("", &logs));
@@ -25,7 +26,7 @@ pub(super) fn job(launch: &Launch, texts: &Texts) -> Result<LaunchFile, Finding>
         .chars()
         .map(|letter| if legal(letter) { letter } else { '_' })
         .collect();
-    let head = texts.head("/bin/bash", "A task of Slurm's: one shard.");
+    let head = texts.head("/bin/bash", "A Slurm array task: one shard.");
     let (shards, jobs) = (launch.request.shards, launch.jobs);
     let shard = quoted(&texts.absolute("shard.sh"));
     Ok(LaunchFile {
@@ -41,9 +42,9 @@ pub(super) fn job(launch: &Launch, texts: &Texts) -> Result<LaunchFile, Finding>
 # Two minutes before the time limit, to this script alone.
 #SBATCH --signal=B:USR1@120
 
-# Of whoever has submitted this; all tasks would compute the same shard.
+# May be set by the submitter; all tasks would then compute the same shard.
 unset NEEDLEBENCH_SHARD
-# A signal ends `wait`, not the shard, which keeps what it has and ends by itself.
+# A signal ends `wait`, not the shard, which saves its results and ends by itself.
 limit=no
 signalled=no
 trap 'signalled=yes; limit=yes; kill -TERM "$child" 2>/dev/null' USR1
@@ -57,15 +58,15 @@ while :; do
     [ "$signalled" = no ] && break
 done
 
-# 3 may pass, and what the time limit has stopped goes on. 2 is for good. After a kill, a node that is lost or a
-# preemption Slurm puts the task back itself, or not if somebody has cancelled it.
+# Retry after 3 and after the time limit; 2 is permanent. After a kill, a lost node or a preemption Slurm requeues
+# the task itself, unless it was cancelled.
 again=no
 [ "$status" = 3 ] && again=yes
 [ "$limit" = yes ] && [ "$status" != 0 ] && [ "$status" != 2 ] && again=yes
-# A shard that was killed, by the system that had no memory left or by hand.
+# The shard was killed: out of memory, or manually.
 [ "$status" = 137 ] && again=yes
 if [ "$again" = yes ] && [ "${{SLURM_RESTART_COUNT:-0}}" -lt {RESTARTS} ]; then
-    # By SLURM_JOB_ID the whole array would be put back: that is the number of its last task.
+    # SLURM_JOB_ID would requeue the whole array: it is the number of its last task.
     scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}"
 fi
 exit "$status"
@@ -76,7 +77,7 @@ exit "$status"
 
 /// Submits the shards that are missing.
 pub(super) fn missing(texts: &Texts) -> LaunchFile {
-    let head = texts.head("/bin/sh", "Starts the shards that are missing again.");
+    let head = texts.head("/bin/sh", "Submits missing shards again.");
     let environment = texts.environment();
     let (program, study, shards, options) =
         (&texts.program, &texts.study, &texts.shards, &texts.options);
@@ -90,14 +91,14 @@ status=$?
 if [ "$status" = 0 ]; then
     echo {done}
 elif [ "$status" = 1 ] && [ -n "$missing" ]; then
-    # Those that wait in the queue are missing too: started twice, the second finds what the first has done.
+    # Shards that wait in the queue are missing too: if started twice, the second finds the results of the first.
     exec sbatch --array="$missing" "$@" {job}
 elif [ "$status" = 1 ]; then
-    echo "none is missing, and some are still running"
+    echo "no shard is missing, some are still running"
 fi
 exit "$status"
 "#,
-            done = quoted(&format!("all shards are there: sh {merge}")),
+            done = quoted(&format!("all shards are complete: sh {merge}")),
         ),
     }
 }

@@ -178,7 +178,7 @@ fn short_shards_and_long_arrays_are_remarked() {
     // 400 shards of 35 s.
     let advice = said("slurm:400", 1_000_000, 14);
     assert!(
-        advice.contains("about 35 s") && advice.contains("ask for 46, "),
+        advice.contains("about 35 s") && advice.contains("use 46 shards, "),
         "{advice}"
     );
     assert_eq!(said("slurm:40", 1_000_000, 14), "");

@@ -3,9 +3,10 @@
 use std::borrow::Cow;
 use std::cell::OnceCell;
 
-use needlebench_cell::{Finding, MovedPhantom, PhantomMove, PhantomMoves, ResolvedScenario, Roll};
+use needlebench_input::Finding;
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::{MovedPhantom, PhantomMove, PhantomMoves, ResolvedScenario, Roll};
 use needlebench_study::Outcome;
 
 use super::proofs::Proofs;
@@ -18,9 +19,9 @@ const MOST_ROLLS: usize = 6;
 /// What is asked of a layout.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Question {
-    /// Whether the configuration works, its posture solved anew.
+    /// Whether the configuration is feasible, with its posture recomputed.
     Aware,
-    /// Whether an arm that stays in this posture keeps its clearances.
+    /// Whether an arm fixed in this posture has the required clearances.
     Unaware(Joints),
 }
 
@@ -66,7 +67,7 @@ fn verdict_on(findings: &[Finding]) -> Verdict {
 }
 
 /// The goal's key at fault, where the move leaves the goal without a needle. A place that the phantom
-/// cannot have, in the table or off it, is no evidence of anything: nobody can move it there.
+/// cannot have, in the table or off it, is no evidence.
 fn goal_at_fault(findings: &[Finding]) -> Option<String> {
     let keys = findings.iter().filter_map(|finding| finding.key.clone());
     keys.into_iter().find(|key| key.starts_with("goals"))
@@ -149,7 +150,7 @@ impl<'a> Layouts<'a> {
         })
     }
 
-    /// Whether the configuration works at a roll.
+    /// Whether the configuration is feasible at a roll.
     fn works_at(&mut self, layout: &Layout<'_>, roll_rad: f64) -> Result<bool, Verdict> {
         if let (Some(proofs), Some(moved)) = (&mut self.proofs, &layout.moved)
             && let Some(works) = proofs.works_at(moved, roll_rad)

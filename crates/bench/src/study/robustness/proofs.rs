@@ -1,17 +1,18 @@
-//! Whether a posture works in a layout whose phantom is moved, without the layout's clearances.
+//! Whether a posture is feasible in a layout whose phantom is moved, without the layout's clearances.
 //!
 //! What a static case looks at is decided thus: joint limits, singularities and the needle's errors are
 //! computed, clearances are proven by bounds of travel or by the pairs alone that these leave open
-//! ([`KnownGaps`]), and the needle's route, which a goal in the phantom takes along, is that of the layout it
+//! ([`KnownGaps`]), and the needle path, which a goal in the phantom takes along, is that of the layout it
 //! comes from. Where a clearance is at its limit up to rounding nothing is decided.
 
-use needlebench_cell::{BodyKind, ClearanceClass, MovedPhantom, ResolvedScenario};
+use needlebench_cell::{BodyKind, ClearanceClass};
 use needlebench_clearance::{ClearanceModel, KnownGaps};
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_evaluation::{first_missed_by_posture, measure_guide};
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::{Joints, Pose};
 use needlebench_planning::{Planner, judge_route_beside, needle_route};
+use needlebench_scenario::{MovedPhantom, ResolvedScenario};
 
 /// Rounding of a distance that is computed at another place of the phantom, m: 2e-7 at most, see
 /// [`needlebench_geometry`].
@@ -23,14 +24,14 @@ pub(super) struct Proofs<'a> {
     configuration: Configuration,
     gaps: KnownGaps<'a>,
     phantom_from_world: Pose,
-    /// What is judged of a posture but for its clearances.
+    /// What is evaluated of a posture besides its clearances.
     judged: ConfigurationReport,
     route: Route,
     /// A criterion is on errors of real arms and patients.
     asks_for_budget: bool,
 }
 
-/// Whether the needle's route keeps its margins.
+/// Whether the needle path has its required margins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Route {
     /// In every layout alike; none where it is at a limit up to rounding.
@@ -97,7 +98,7 @@ impl<'a> Proofs<'a> {
         })
     }
 
-    /// Whether the configuration works at a roll: whether its row in a study would be ok.
+    /// Whether the configuration is feasible at a roll: whether its row in a study would be ok.
     pub fn works_at(&mut self, moved: &MovedPhantom, roll_rad: f64) -> Option<bool> {
         let route = match self.route {
             Route::GoesWithPhantom(kept) => kept?,
@@ -125,8 +126,7 @@ impl<'a> Proofs<'a> {
     }
 }
 
-/// How much farther the needle's route is from what it has to keep away from than it has to be, m; infinite
-/// where there is nothing.
+/// Clearance of the needle path in excess of the required one, m; infinite without obstacles.
 fn route_surplus_m(resolved: &ResolvedScenario, moved: &MovedPhantom) -> f64 {
     let MovedPhantom { phantom, goal, .. } = moved;
     let judged = judge_route_beside(resolved, phantom, goal);

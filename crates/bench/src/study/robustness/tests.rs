@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use needlebench_cell::{Overrides, Setting};
+use needlebench_scenario::{Overrides, Setting};
 
 use super::*;
 
