@@ -9,8 +9,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use needlebench_bench::study::robustness::{Robustness, RobustnessSettings, robustness};
-use needlebench_cell::{Overrides, ScenarioFamily};
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::{Overrides, ScenarioFamily};
 
 /// Time that this thread has been on a processor.
 fn processor_time() -> Duration {

@@ -17,7 +17,6 @@ use std::time::{Duration, Instant};
 
 use needlebench_bench::study::dynamic_rows;
 use needlebench_bench::{RunOptions, run_scenario};
-use needlebench_cell::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
@@ -25,8 +24,9 @@ use needlebench_engine::{
     choose_engines,
 };
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use needlebench_planning::Planner;
+use needlebench_scenario::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily};
 
 const REPETITIONS: usize = 5;
 

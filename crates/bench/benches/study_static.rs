@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use needlebench_bench::study::{CaseRow, StaticWorker, StudyColumns, static_rows};
-use needlebench_cell::study::StudyMode;
-use needlebench_cell::{Change, KeyPath, Overrides, ScenarioFamily, Setting, resolve_scenario};
+use needlebench_scenario::study::StudyMode;
+use needlebench_scenario::{Change, KeyPath, Overrides, ScenarioFamily, Setting, resolve_scenario};
 
 /// Scenario, its goal, and what fixes the roll where the goal does not.
 const CELLS: [(&str, &str, bool); 2] = [

@@ -3,14 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
 
-use needlebench_cell::study::FactorValues;
-use needlebench_cell::study_criteria::{BEST, EVERY};
-use needlebench_cell::{Finding, ResolvedScenario, nearest_name};
 use needlebench_evaluation::accuracy::{
     AccuracyTable, Drawn, HitRadius, QUANTITIES, Sample, summarise,
 };
 use needlebench_evaluation::report::{ConfigurationReport, Report, Status};
+use needlebench_input::{Finding, nearest_name};
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::study::FactorValues;
+use needlebench_scenario::study_criteria::{BEST, EVERY};
 use needlebench_study::statistics::BestConfiguration;
 use needlebench_study::{
     CaseResult, Factor, FactorKind, FactorValue, Outcome, Results, ResultsError, Row,
@@ -37,7 +38,7 @@ pub enum Needles {
 
 /// What [`Needles`] are called on a command line, and none of them was said.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("it is `best`, `every` or a configuration's label, such as Right-Up-Fold")]
+#[error("use `best`, `every` or a configuration's label, e.g. Right-Up-Fold")]
 pub struct UnknownNeedles;
 
 impl FromStr for Needles {
@@ -60,7 +61,7 @@ impl Needles {
         match (self, is_run) {
             (Self::Best, true) => "the recommended configuration of each goal".to_owned(),
             (Self::Best, false) => {
-                "of each case the configuration that is ok with the largest clearance".to_owned()
+                "in each case the feasible configuration with the largest clearance".to_owned()
             }
             (Self::Every, _) => "every configuration that is not rejected".to_owned(),
             (Self::Of(configuration), _) => {
@@ -94,7 +95,7 @@ impl AccuracyRequest {
 /// Why there is no table.
 #[derive(Debug, thiserror::Error)]
 pub enum AccuracyError {
-    /// What was asked for does not fit.
+    /// The request does not fit.
     #[error(transparent)]
     Request(#[from] Finding),
     /// The table of results cannot be read.
@@ -108,19 +109,16 @@ pub enum AccuracyError {
 /// A [`Finding`] with the nearest name.
 fn place_of(name: &str, known: &[&str], file: &str) -> Result<usize, Finding> {
     known.iter().position(|each| *each == name).ok_or_else(|| {
-        let finding = Finding::new(
-            file,
-            format!("there is nothing called `{name}` to group by"),
-        );
+        let finding = Finding::new(file, format!("cannot group by `{name}`: unknown name"));
         let hint = match nearest_name(name, known.iter().copied()) {
             Some(nearest) => format!("did you mean `{nearest}`?"),
-            None => format!("groups are of {}", known.join(", ")),
+            None => format!("group by {}", known.join(", ")),
         };
         finding.key("--by").hint(hint)
     })
 }
 
-/// Whether what was asked for can be had of a run, before it is made.
+/// Whether the request is possible for a run, before the run is made.
 ///
 /// # Errors
 /// A group that runs do not have, or a run without needles.
@@ -130,10 +128,10 @@ pub fn check_run(request: &AccuracyRequest, resolved: &ResolvedScenario) -> Resu
         place_of(&name, &[GOAL, CONFIGURATION], file)?;
     }
     if resolved.goals.is_empty() {
-        let finding = Finding::new(file, "there is no needle whose accuracy a table could show");
+        let finding = Finding::new(file, "no needle to tabulate the accuracy of");
         return Err(finding
             .key("--table")
-            .hint("a table of accuracy is of goals; a test by ISO 9283 has none"));
+            .hint("an accuracy table requires goals; an ISO 9283 test has none"));
     }
     Ok(())
 }
@@ -255,29 +253,29 @@ pub fn accuracy_of_run(
     let drawn = Drawn::Nothing(if report.truth.is_some() {
         "a run is one draw of arm and patient".to_owned()
     } else {
-        "nothing is drawn".to_owned()
+        "nothing is sampled".to_owned()
     });
     let radius_mm = hit_radius.as_ref().map(|found| found.radius_mm);
     let (groups, all, tests) = summarise(&labels, &samples, radius_mm, &drawn);
     let mut notes = vec![format!("Needles: {}.", needles.words(true))];
     notes.push(match (&report.truth, is_simulated) {
         (None, true) => {
-            "The simulated arm is just what its controller believes: these are residuals of \
-                         control and integration, and nothing of a real arm's accuracy."
+            "The simulated arm has no imperfections: values are simulation residuals (control and \
+             integration errors), not the accuracy of a real arm."
                 .to_owned()
         }
         (None, false) => {
-            "The arm is just what its controller believes: these are residuals of the inverse \
-                          kinematics, and nothing of a real arm's accuracy."
+            "The arm has no imperfections: values are residuals of the inverse kinematics, not the accuracy \
+             of a real arm."
                 .to_owned()
         }
         (Some(truth), _) => format!(
-            "All needles are of the one arm and patient that seed {} draws; a study is of many.",
+            "All needles are of the one arm and patient sampled by seed {}; a study covers many.",
             truth.seed
         ),
     });
     if is_simulated && report.provenance.engines.len() > 1 {
-        notes.push("Simulated figures are those of the engine that is worse.".to_owned());
+        notes.push("Simulated values are those of the worse engine.".to_owned());
     }
     AccuracyTable {
         name: report.scenario.name.clone(),
@@ -322,7 +320,7 @@ fn group_factors(
             if matches!(factor.kind, FactorKind::Continuous { .. }) {
                 return Err(Finding::new(
                     file,
-                    format!("`{name}` is a continuum: it has no groups"),
+                    format!("`{name}` is continuous: it has no groups"),
                 )
                 .key("--by")
                 .hint("group by a factor with `values`, `levels` or `grid`"));
@@ -412,7 +410,7 @@ pub fn accuracy_of_study(
     let drawn = if factors.iter().any(Factor::is_sampled) {
         Drawn::Blocks
     } else {
-        Drawn::Nothing("no factor is drawn at random".to_owned())
+        Drawn::Nothing("no factor is sampled at random".to_owned())
     };
     let radius_mm = hit_radius.as_ref().map(|found| found.radius_mm);
     let (groups, all, tests) = summarise(&labels, &samples, radius_mm, &drawn);
@@ -443,14 +441,13 @@ fn notes_of_study(prepared: &PreparedStudy, needles: Needles) -> Vec<String> {
     });
     notes.extend(changing.map(|factor| {
         format!(
-            "The factor `{}` changes [imperfections]: what is in the errors of a group is what its level says.",
+            "The factor `{}` changes [imperfections]: the errors of a group follow its level.",
             factor.name
         )
     }));
     if prepared.study.family.base().imperfections.is_none() && notes.len() == 1 {
         notes.push(
-            "The arm is just what its controller believes: these are residuals, and nothing of a real arm's \
-             accuracy."
+            "The arm has no imperfections: values are residuals, not the accuracy of a real arm."
                 .to_owned(),
         );
     }
@@ -459,7 +456,7 @@ fn notes_of_study(prepared: &PreparedStudy, needles: Needles) -> Vec<String> {
     let names: Vec<&str> = choices.map(|each| each.name.as_str()).collect();
     if !names.is_empty() {
         notes.push(format!(
-            "All choices ({}) are in it, not the best one alone.",
+            "Includes all candidates ({}), not only the best one.",
             names.join(", ")
         ));
     }

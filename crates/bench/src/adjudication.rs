@@ -1,6 +1,6 @@
-//! The fourth stage: engines beside the referee, and their differences inside the envelope.
+//! The fourth stage, discrepancy analysis: engines compared with the reference integrator, and their differences within
+//! tolerance.
 
-use needlebench_cell::Goal;
 use needlebench_engine::{
     Engine, EngineError, EngineIdentity, EnginePool, Hooks, MotionJob, MotionSettings, Plant,
     REFEREE, Recording, RefereePlant, RefereeSettings, run_motions,
@@ -16,6 +16,7 @@ use needlebench_evaluation::referee::{
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::GoalPlan;
+use needlebench_scenario::Goal;
 
 use crate::control::Control;
 use crate::setup::Setup;
@@ -27,7 +28,7 @@ const STEP_DIVISORS: [u32; 3] = [1, 2, 4];
 /// What was found out about one configuration.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Adjudicated {
-    /// The engines beside the referee.
+    /// The engines compared with the reference integrator.
     pub referee: Option<RefereeReport>,
     /// The engines' differences and the envelope.
     pub adjudication: Option<Adjudication>,
@@ -55,13 +56,13 @@ impl Adjudicated {
 pub(crate) struct Adjudications {
     /// By goal and configuration.
     pub by_goal: Vec<Vec<Adjudicated>>,
-    /// The referee, if it was called.
+    /// The reference integrator, if it was called.
     pub identity: Option<EngineIdentity>,
     /// What could not be done.
     pub notes: Vec<String>,
 }
 
-/// What is judged.
+/// What is evaluated.
 pub(crate) struct Adjudicator<'a> {
     pub setup: &'a Setup<'a>,
     pub plans: &'a [GoalPlan],
@@ -70,11 +71,11 @@ pub(crate) struct Adjudicator<'a> {
     /// Engines that made them.
     pub engines: &'a [&'static dyn Engine],
     pub pool: &'a EnginePool,
-    /// Call the referee for every motion, not only where the envelope is exceeded.
+    /// Call the reference integrator for every motion, not only where the envelope is exceeded.
     pub always: bool,
 }
 
-/// A configuration that is held against the referee.
+/// A configuration that is compared with the reference integrator.
 #[derive(Clone, Copy)]
 struct Case<'a> {
     goal_index: usize,
@@ -95,16 +96,16 @@ struct AtStep {
 /// What is kept of a motion: recordings themselves would fill the memory.
 struct Traced {
     tip: TipPath,
-    /// The referee under the motion's torques; none if it is too short for that.
+    /// The reference integrator under the motion's torques; none if it is too short for that.
     held: Option<HeldTorques>,
 }
 
-/// What the referee says of a case: of each engine, and of pairs of them.
+/// What the reference integrator yields for a case: of each engine, and of pairs of them.
 type Verdict = (RefereeReport, Vec<PairConvergence>);
 
 impl Adjudicator<'_> {
-    /// Judges every configuration that several engines simulated, and calls the referee where asked
-    /// for or where the engines differ by more than they may.
+    /// Evaluates every configuration that several engines simulated, and calls the reference integrator where asked for
+    /// or where the engines differ by more than they may.
     pub(crate) fn judge_all(&self, control: &Control<'_>) -> Adjudications {
         let mut found = Adjudications {
             by_goal: Vec::new(),
@@ -136,7 +137,7 @@ impl Adjudicator<'_> {
                 Err(EngineError::Cancelled) => {}
                 Err(error) => found
                     .notes
-                    .push(format!("the referee could not be heard: {error}")),
+                    .push(format!("reference integrator failed: {error}")),
             }
         }
         // What lies beyond the envelope without a referee: contact, or a referee that failed.
@@ -188,7 +189,7 @@ impl Adjudicator<'_> {
         )
     }
 
-    /// All cases beside the referee, with the engines' differences from each other by step.
+    /// All cases compared with the reference integrator, with the engines' differences from each other by step.
     fn referee(
         &self,
         cases: &[Case<'_>],
@@ -278,7 +279,7 @@ impl Adjudicator<'_> {
         TipPath::of(self.setup.real.cell(), case.goal, recording)
     }
 
-    /// A motion, and the referee under its torques.
+    /// A motion, and the reference integrator under its torques.
     fn traced(&self, case: &Case<'_>, recording: &Recording) -> Result<Traced, EngineError> {
         let tip = self.tip(case, recording);
         let windows = self.referee_plant()?.held_windows(

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Point3;
-use needlebench_cell::imperfections::{ArmClass, BreathState, Imperfections};
-use needlebench_cell::{ArmInUse, ClearanceClass, Expected, Goal, ResolvedScenario, enclosures};
+use needlebench_cell::{ClearanceClass, Rule};
 use needlebench_engine::{EngineIdentity, Recording, pieces_in_words};
 use needlebench_evaluation::metric::measured;
 use needlebench_evaluation::ranking::rank_goal;
@@ -21,9 +20,12 @@ use needlebench_evaluation::{
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{
-    ConfigurationPlan, GoalPlan, Margin, Planner, PostureMargins, Rejection, Rule,
-    crossed_fissures, judge_route, needle_route,
+    ConfigurationPlan, GoalPlan, Margin, Planner, PostureMargins, Rejection, crossed_fissures,
+    judge_route, needle_route,
 };
+use needlebench_robot::{ArmInUse, enclosures};
+use needlebench_scenario::imperfections::{ArmClass, BreathState, Imperfections};
+use needlebench_scenario::{Expected, Goal, ResolvedScenario};
 use needlebench_uncertainty::Source;
 
 use crate::adjudication::Adjudicated;
@@ -53,7 +55,7 @@ pub(crate) struct Results<'a> {
 pub(crate) struct Context<'a> {
     pub setup: &'a Setup<'a>,
     pub budgets: &'a Budgets,
-    /// None where nobody asks for the room.
+    /// None if the room is not requested.
     pub room: Option<RoomModel<'a>>,
     pub events: &'a [EventRun],
     /// Engines that were to measure everything.
@@ -104,9 +106,13 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
         iso9283: None,
         excitation: None,
         engine_failures: results.failures,
-        arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
+        arm: resolved
+            .robot_description
+            .arm
+            .as_ref()
+            .map(ArmInUse::report),
         gravity: resolved.gravity.clone(),
-        enclosure: enclosures(&resolved.cell.robot),
+        enclosure: enclosures(&resolved.cell.robot, &resolved.robot_description),
         assumed: assumed(resolved),
         notes: notes(resolved, results.engines),
         expected: resolved.expected.as_ref().map(expected_report),
@@ -118,7 +124,7 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
 
 /// Values of the arm that are assumed.
 pub(crate) fn assumed(resolved: &ResolvedScenario) -> BTreeMap<String, String> {
-    let arm = resolved.cell.robot.arm.as_ref();
+    let arm = resolved.robot_description.arm.as_ref();
     arm.map_or_else(BTreeMap::new, |arm| arm.arm.data.assumed())
 }
 
@@ -133,21 +139,21 @@ pub(crate) fn notes(resolved: &ResolvedScenario, engines: &[&str]) -> Vec<String
     notes
 }
 
-/// What arm and patient the expected tip errors are of.
+/// Arm and patient population of the RMS tip errors.
 fn expected_report(expected: &Expected) -> ExpectedReport {
     ExpectedReport {
         arm: expected.class.map(ArmClass::name),
         arm_in_words: match expected.class {
             Some(ArmClass::FactoryCalibrated) => {
-                "the controller knows the maker's calibration of its arm: what is left is what that \
-                 leaves, and what moves with the load"
+                "factory calibration applied; residual calibration error and load-dependent \
+                 deflection remain"
             }
             Some(ArmClass::NominalKinematics) => {
-                "inverse kinematics with nominal lengths: the arm is off by all that a calibration would say"
+                "inverse kinematics with nominal lengths; the full calibration error remains"
             }
             Some(ArmClass::CalibratedHere) => {
-                "the controller knows a calibration measured in place with the tool on: what is left is \
-                 what that leaves"
+                "calibrated on site with the tool mounted; residual calibration error and the \
+                 deflection that a calibration cannot represent remain"
             }
             None => own_in_words(&expected.imperfections),
         },
@@ -158,16 +164,16 @@ fn expected_report(expected: &Expected) -> ExpectedReport {
     }
 }
 
-/// Of which arm and patient it is, where the scenario says it: what was measured is said.
+/// Arm and patient population from the scenario, with what was measured.
 fn own_in_words(imperfections: &Imperfections) -> &'static str {
     let [markers, target] = [Source::Registration, Source::Imaging]
         .map(|source| source.is_measured_in(imperfections) == Some(true));
     match (markers, target) {
-        (false, false) => "as the scenario's [imperfections] say",
-        (true, false) => "as the scenario's [imperfections] say, marker localisation as measured",
-        (false, true) => "as the scenario's [imperfections] say, target localisation as measured",
+        (false, false) => "from the scenario's [imperfections]",
+        (true, false) => "from the scenario's [imperfections], measured marker localisation",
+        (false, true) => "from the scenario's [imperfections], measured target localisation",
         (true, true) => {
-            "as the scenario's [imperfections] say, localisation of markers and target as measured"
+            "from the scenario's [imperfections], measured marker and target localisation"
         }
     }
 }
@@ -190,17 +196,17 @@ fn bases_in_words(imperfections: &Imperfections) -> Option<String> {
         String::new()
     } else {
         format!(
-            "; as the scenario and its defaults assume: {}",
+            "; assumed by the scenario and its defaults: {}",
             listed(&assumed)
         )
     };
     let measured = listed(&measured);
     Some(format!(
-        "error budget by measured covariances: {measured}{others}"
+        "error budget from measured covariances: {measured}{others}"
     ))
 }
 
-/// How the planned needle of a goal keeps away from what it must not meet.
+/// Clearance of a goal's planned needle path.
 pub(crate) fn route_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<RouteReport> {
     let judged = judge_route(resolved, goal)?;
     Some(RouteReport {
@@ -212,7 +218,7 @@ pub(crate) fn route_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<R
     })
 }
 
-/// The report of one goal, neither judged nor ranked.
+/// The report of one goal, neither evaluated nor ranked.
 pub(crate) fn goal_report(
     context: &Context<'_>,
     goal_index: usize,
@@ -379,7 +385,7 @@ pub(crate) fn margins_report(margins: &PostureMargins) -> MarginsReport {
     }
 }
 
-/// How far the posture is from breaking a rule; of one that is out of reach by how much it misses.
+/// Constraint margin of the posture; of one out of reach, by how much it misses.
 fn surplus_m(planner: &Planner<'_>, plan: &ConfigurationPlan) -> Option<f64> {
     match (&plan.candidate, plan.rejections.first()) {
         (Some(candidate), _) => Some(planner.surplus(candidate, &plan.rejections)),
@@ -471,7 +477,7 @@ fn overall_clearance(
     ClearanceReport::new(classes)
 }
 
-/// Proven clearances of the way back.
+/// Certified clearances of the retreat.
 fn retreat_clearance(setup: &Setup<'_>, plan: &ConfigurationPlan) -> ClearanceReport {
     let Setup {
         resolved, model, ..
@@ -489,7 +495,7 @@ fn retreat_clearance(setup: &Setup<'_>, plan: &ConfigurationPlan) -> ClearanceRe
         })
 }
 
-/// What a motion keeps, as a value of the report.
+/// Margins of a motion, as a value of the report.
 fn margin_report(margin: &Margin) -> MarginReport {
     let least = margin.least();
     MarginReport {
@@ -519,7 +525,7 @@ fn margin_report(margin: &Margin) -> MarginReport {
     }
 }
 
-/// A broken rule, as a value of the report.
+/// A violated rule, as a value of the report.
 pub(crate) fn rejection_report(rejection: &Rejection) -> RejectionReport {
     RejectionReport {
         rule: rejection.rule.name(),

@@ -1,8 +1,8 @@
 //! The fifth stage: error budgets.
 
-use needlebench_cell::Expected;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::{ConfigurationPlan, GoalPlan};
+use needlebench_scenario::Expected;
 use needlebench_uncertainty::budget::{
     BudgetCase, ErrorBudget, Moments, PointBudget, Samples, SourceBudget, budget, total_budget,
 };
@@ -13,11 +13,10 @@ use crate::setup::Setup;
 /// wrong where there is none.
 pub(crate) type Budgets = Vec<Vec<Option<Result<ErrorBudget, String>>>>;
 
-/// Budgets of all configurations that have a motion, over the arms and patients that the expected tip
-/// error is of.
+/// Error budgets of all configurations that have a motion, over the arm and patient population of the RMS tip error.
 ///
-/// Those of the scenario's own imperfections are drawn source by source too; of a class of arm what the
-/// draws are for is how far 95 % of them stay within.
+/// With the scenario's own imperfections each source is also sampled by itself; for a class of arm only all sources
+/// together are, for the P95.
 pub(crate) fn budgets(setup: &Setup<'_>, plans: &[GoalPlan], threads: usize) -> Budgets {
     let seed = setup.resolved.scenario.seed;
     let expected = setup.resolved.expected.as_ref();

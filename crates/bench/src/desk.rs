@@ -1,15 +1,17 @@
-//! A scenario in whose cell goals are tried as fast as somebody moves them.
+//! A scenario in whose cell goals are tried interactively.
 //!
-//! What does not depend on the goal is prepared once; everything else is what [`Preview`](crate::Preview) and a run have.
+//! What does not depend on the goal is prepared once; everything else is what [`Preview`](crate::Preview) and a run
+//! have.
 
-use needlebench_cell::{Expected, Finding, Goal, GoalPlacer, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::Servo;
+use needlebench_input::Finding;
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::ik::{Configuration, Kinematics};
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::{ConfigurationPlan, Member, Planner};
+use needlebench_scenario::{Expected, Goal, GoalPlacer, ResolvedScenario};
 use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
 
 use crate::preview::{GoalPreview, preview_of};
@@ -60,8 +62,8 @@ impl Desk {
         Ok(self.preview_by(goal, threads, posture))
     }
 
-    /// The same of a few directions about the needle, without what would free the others: what works here works, what does
-    /// not may at another direction.
+    /// The same of a few directions about the needle, without what would free the others: what works here works, what
+    /// does not may at another direction.
     ///
     /// # Errors
     /// As [`Desk::preview`].
@@ -83,7 +85,7 @@ impl Desk {
         preview_of(&self.resolved, goal, members)
     }
 
-    /// The whole motion of one configuration, with what is proven of its clearances.
+    /// The whole motion of one configuration, with its certified clearances.
     ///
     /// # Errors
     /// As [`Desk::preview`].
@@ -95,8 +97,8 @@ impl Desk {
         Ok(self.planner()?.plan_one(goal, configuration))
     }
 
-    /// Bias and covariance of the needle at skin and target, over the arms and patients that the scenario's expected tip
-    /// error is of; axes as those of [`Moments`]. None where the arm's data do not say enough.
+    /// Bias and covariance of the needle's error at skin and target, over the arm and patient population of the
+    /// scenario's RMS tip error; axes as those of [`Moments`]. None where the arm's data do not suffice.
     pub fn expected_error(
         &self,
         goal: &Goal,

@@ -1,93 +1,171 @@
 //! Entries that scenarios leave open: the best proposal, or the planned route of a goal with `[goals.route]`.
 
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use needlebench_cell::scenario::{GoalSection, RouteSection};
-use needlebench_cell::{ChosenEntry, ResolvedScenario};
+use nalgebra::Point3;
+use needlebench_phantom::Phantom;
+use needlebench_routing::RouteRules;
+use needlebench_scenario::scenario::{GoalSection, NeedleRouteSection, RouteSection};
+use needlebench_scenario::{ChooseEntry, ChosenEntry, GoalPlacer, NoEntry, ResolvedScenario};
 
 use crate::Control;
 use crate::progress::Silent;
-use crate::routes::{RoutePlan, RouteTask, SOLID_DIRECTIONS, WithRobot, plan_routes};
+use crate::routes::{FreeRoutes, RouteTask, SOLID_DIRECTIONS, WithRobot, free_routes};
 use crate::suggest::{SuggestError, suggest_entries};
 
-/// Chooses the entry of a goal that has none. The choice does not depend on the number of threads.
-///
-/// # Errors
-/// A message and a hint, where there is none.
-pub fn choose_entry(
-    resolved: &ResolvedScenario,
-    section: &GoalSection,
-) -> Result<ChosenEntry, [String; 2]> {
-    let control = Control {
-        threads: std::thread::available_parallelism().map_or(1, usize::from),
-        cancel: &AtomicBool::new(false),
-        progress: &Silent,
-    };
-    let chosen = match &section.route {
-        Some(rules) => by_route(resolved, section, rules, &control),
-        None => by_proposal(resolved, section, &control),
-    };
-    chosen.map_err(|error| match error {
-        SuggestError::Interrupted => [error.to_string(), String::new()],
-        SuggestError::Refused { message, hint } => [message, hint],
-    })
+/// Patients whose admissible needle paths are kept: as many as six sizes of chest with four lesions, and some more.
+const MOST_KEPT: usize = 32;
+
+/// Finds entries. The needle paths that the patient alone admits are kept: they do not depend on where the patient
+/// lies.
+#[derive(Debug, Default)]
+pub struct EntryFinder {
+    kept: Mutex<Vec<Kept>>,
 }
 
-/// The planned route.
-fn by_route(
-    resolved: &ResolvedScenario,
-    section: &GoalSection,
-    rules: &RouteSection,
-    control: &Control<'_>,
-) -> Result<ChosenEntry, SuggestError> {
-    let task = RouteTask {
-        resolved,
-        section,
-        rules,
-        robot: WithRobot::Yes,
-        directions: SOLID_DIRECTIONS,
-    };
-    let plan = plan_routes(&task, &task.solids()?, control)?;
-    let Some(chosen) = &plan.chosen else {
-        return Err(no_route(&plan));
-    };
-    let route = &plan.routes[chosen.route];
-    let [azimuth, elevation] = route.direction_deg;
-    let served = chosen.configuration.map_or_else(String::new, |label| {
-        format!(", {} of 8 configurations, best {label}", route.working)
-    });
-    Ok(ChosenEntry {
-        direction_deg: route.direction_deg,
-        in_words: format!(
-            "`entry_direction_deg = [{azimuth}, {elevation}]`, {:.0} mm deep, odds {:.2}{served}; `needlebench ct routes` \
-             shows the others",
-            route.depth_m * 1e3,
-            route.risk.odds_ratio
-        ),
-    })
+/// Admissible paths, once they were searched for. The searching thread holds the lock, so that no other does the same.
+type Slot = Arc<Mutex<Option<Arc<FreeRoutes>>>>;
+
+/// Admissible needle paths, and all that they depend on.
+#[derive(Debug)]
+struct Kept {
+    patient: Patient,
+    free: Slot,
 }
 
-fn no_route(plan: &RoutePlan) -> SuggestError {
-    let message = if plan.free == 0 {
-        let most = plan.refused.iter().max_by_key(|each| each.count);
-        format!(
-            "goal `{}` has no route: none of {} directions is free, most often: {}",
-            plan.goal,
-            plan.tried,
-            most.map_or("", |each| each.in_words)
-        )
-    } else {
-        format!(
-            "goal `{}` has no route that the robot serves: of {} that stand for the rest, none in {} of 8 configurations",
-            plan.goal,
-            plan.routes.len(),
-            plan.wanted
-        )
-    };
-    SuggestError::refused(
+#[derive(Debug)]
+struct Patient {
+    phantom: Arc<Phantom>,
+    target: Point3<f64>,
+    has_lesion: bool,
+    run: NeedleRouteSection,
+    rules: RouteRules,
+}
+
+impl PartialEq for Patient {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.phantom, &other.phantom)
+            && self.target == other.target
+            && self.has_lesion == other.has_lesion
+            && self.run == other.run
+            && self.rules == other.rules
+    }
+}
+
+impl ChooseEntry for EntryFinder {
+    fn choose(&self, cell: &ResolvedScenario, goal: &GoalSection) -> Result<ChosenEntry, NoEntry> {
+        let control = Control {
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            cancel: &AtomicBool::new(false),
+            progress: &Silent,
+        };
+        match &goal.route {
+            Some(rules) => self.by_route(cell, goal, rules, &control),
+            None => by_proposal(cell, goal, &control),
+        }
+    }
+}
+
+impl EntryFinder {
+    /// The planned route.
+    fn by_route(
+        &self,
+        resolved: &ResolvedScenario,
+        section: &GoalSection,
+        rules: &RouteSection,
+        control: &Control<'_>,
+    ) -> Result<ChosenEntry, NoEntry> {
+        let task = RouteTask {
+            resolved,
+            section,
+            rules,
+            robot: WithRobot::Yes,
+            directions: SOLID_DIRECTIONS,
+        };
+        let free = self.free(&task, control)?;
+        let Some(route) = free.best_served(&task, control)? else {
+            return Err(nothing_serves(
+                free.why_none(&task),
+                "`needlebench ct routes` lists all paths tried, and changes that make one feasible",
+            ));
+        };
+        let [azimuth, elevation] = route.direction_deg;
+        Ok(ChosenEntry {
+            direction_deg: route.direction_deg,
+            in_words: format!(
+                "`entry_direction_deg = [{azimuth}, {elevation}]`, {:.0} mm deep, odds {:.2}, \
+                 feasible in {} of 8 configurations, best posture {}; `needlebench ct routes` \
+                 lists the others",
+                route.depth_m * 1e3,
+                route.odds_ratio,
+                route.working,
+                route.best
+            ),
+        })
+    }
+
+    /// Paths admissible for the patient alone, searched for once.
+    fn free(
+        &self,
+        task: &RouteTask<'_>,
+        control: &Control<'_>,
+    ) -> Result<Arc<FreeRoutes>, SuggestError> {
+        let slot = self.slot(Patient {
+            phantom: Arc::clone(task.phantom()?),
+            target: GoalPlacer::new(task.resolved).target(task.section)?,
+            has_lesion: task.section.lesion.is_some(),
+            run: task.resolved.scenario.planning.needle_route.clone(),
+            rules: task.route_rules(),
+        });
+        let mut known = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(free) = &*known {
+            return Ok(Arc::clone(free));
+        }
+        let free = Arc::new(free_routes(task, &task.solids()?, control)?);
+        *known = Some(Arc::clone(&free));
+        Ok(free)
+    }
+
+    /// Where the admissible paths of a patient are kept; the oldest are dropped.
+    fn slot(&self, patient: Patient) -> Slot {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = kept.iter().find(|each| each.patient == patient) {
+            return Arc::clone(&known.free);
+        }
+        if kept.len() >= MOST_KEPT {
+            kept.remove(0);
+        }
+        let free = Slot::default();
+        kept.push(Kept {
+            patient,
+            free: Arc::clone(&free),
+        });
+        free
+    }
+}
+
+fn nothing_serves(message: String, hint: &str) -> NoEntry {
+    NoEntry {
         message,
-        "`needlebench ct routes` shows all that was tried, and what would free one",
-    )
+        hint: hint.to_owned(),
+        nothing_serves: true,
+    }
+}
+
+impl From<SuggestError> for NoEntry {
+    fn from(error: SuggestError) -> Self {
+        let message = error.to_string();
+        let hint = match error {
+            SuggestError::Interrupted => String::new(),
+            SuggestError::Refused { hint, .. } => hint,
+        };
+        Self {
+            message,
+            hint,
+            nothing_serves: false,
+        }
+    }
 }
 
 /// The first proposal.
@@ -95,16 +173,17 @@ fn by_proposal(
     resolved: &ResolvedScenario,
     section: &GoalSection,
     control: &Control<'_>,
-) -> Result<ChosenEntry, SuggestError> {
+) -> Result<ChosenEntry, NoEntry> {
     let found = suggest_entries(resolved, section, 1, control)?;
     let Some(entry) = found.entries.first() else {
-        return Err(SuggestError::refused(
+        return Err(nothing_serves(
             format!(
                 "goal `{}` has no entry, and none can be assumed: {}",
                 found.goal,
                 found.why_none()
             ),
-            "`needlebench suggest` shows all that was tried; or give `entry_mm` or `entry_direction_deg`",
+            "`needlebench suggest` lists all entries tried; or give `entry_mm` or \
+             `entry_direction_deg`",
         ));
     };
     let nearest = entry
@@ -123,8 +202,8 @@ fn by_proposal(
     Ok(ChosenEntry {
         direction_deg: entry.direction_deg,
         in_words: format!(
-            "`entry_direction_deg = [{azimuth}, {elevation}]`, {:.0} mm deep{nearest}; the first of those that \
-             `needlebench suggest` proposes",
+            "`entry_direction_deg = [{azimuth}, {elevation}]`, {:.0} mm deep{nearest}; first \
+             proposal of `needlebench suggest`",
             entry.depth_m * 1e3
         ),
     })

@@ -1,11 +1,9 @@
-//! A run that excites every joint, in place of goals: once with each payload, in each engine.
+//! An excitation run, in place of goals: once with each payload, in each engine.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
 
 use nalgebra::Vector3;
-use needlebench_cell::ResolvedScenario;
-use needlebench_cell::excitation::ExcitationProtocol;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{
     Actuation, Engine, EngineError, EngineIdentity, EnginePool, Hooks, Motion, MotionJob,
@@ -21,6 +19,8 @@ use needlebench_evaluation::{
 };
 use needlebench_parallel::in_parallel;
 use needlebench_planning::excitation::{ExcitationError, ExcitationPlan};
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::excitation::ExcitationProtocol;
 
 use crate::assemble::notes;
 use crate::control::Control;
@@ -143,7 +143,7 @@ pub(crate) fn run(
     })
 }
 
-/// The proven clearances of each motion.
+/// The certified clearances of each motion.
 pub fn motions(resolved: &ResolvedScenario, plan: &ExcitationPlan) -> Vec<MotionReport> {
     plan.motions
         .iter()
@@ -165,7 +165,7 @@ fn simulate(
     control: &Control<'_>,
 ) -> Vec<EngineMade> {
     let pool = EnginePool::new(engines);
-    let settings = &setups[0].resolved.scenario.engines;
+    let settings = &setups[0].resolved.scenario.engines.settings();
     control.progress.message("simulating");
     control
         .progress

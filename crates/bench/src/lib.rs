@@ -1,6 +1,6 @@
-//! What a run is: a scenario planned, simulated, measured and judged; and likewise its events, a test
-//! by ISO 9283, a run that excites every joint, the engines beside the referee, the atlas of a goal, the
-//! servo's data sheet, the replay of a recorded run and a case of a study.
+//! What a run is: a scenario planned, simulated, measured and evaluated; and likewise its events, a test by ISO 9283,
+//! an excitation run, the engines compared with the reference integrator, the roll map of a goal, the servo's data
+//! sheet, the replay of a recorded run and a case of a study.
 //!
 //! Gives values only: nothing here prints, draws or writes files.
 //!
@@ -17,7 +17,6 @@ mod assemble;
 pub mod atlas;
 mod budgets;
 mod control;
-pub mod credibility;
 pub mod ct;
 mod desk;
 mod entry;
@@ -49,7 +48,7 @@ pub mod suggest;
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use control::Control;
 pub use desk::Desk;
-pub use entry::choose_entry;
+pub use entry::EntryFinder;
 pub use events::{EngineEvents, EventRun, StagedStop};
 pub use needlebench_geometry::mesh::{forget_kept_meshes, kept_meshes};
 pub use preview::Preview;

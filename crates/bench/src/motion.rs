@@ -1,13 +1,15 @@
-//! One motion that works: of a goal in a configuration, as a run of that goal has it.
+//! One feasible motion: of a goal in a configuration, as a run of that goal has it.
 
 use std::fmt::Write as _;
 
-use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Finding, Goal, ResolvedScenario, rule_in_words};
+use needlebench_cell::rule_in_words;
 use needlebench_evaluation::report::{ConfigurationReport, Report, Status};
+use needlebench_input::Finding;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::ConfigurationPlan;
+use needlebench_scenario::scenario::EngineName;
+use needlebench_scenario::{Goal, ResolvedScenario};
 
 use crate::control::Control;
 use crate::run::run;
@@ -15,7 +17,7 @@ use crate::runnable::Runnable;
 use crate::scenario_run::{RunOptions, ScenarioRun};
 use crate::simulate::EngineRun;
 
-/// A motion that a run says works, with that run.
+/// A motion that is feasible in a run, with that run.
 #[derive(Debug)]
 pub struct WorkingMotion {
     resolved: ResolvedScenario,
@@ -26,7 +28,7 @@ pub struct WorkingMotion {
 /// Why there is no motion.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoMotion {
-    /// What is wrong with what is asked for: a goal that is not named or does not exist, a configuration that does not work.
+    /// What is wrong with a request: a goal that is not named or does not exist, an infeasible configuration.
     Refused(Finding),
     /// The engine or what it needs failed.
     Engine(String),
@@ -142,7 +144,7 @@ fn goal_of(resolved: &ResolvedScenario, name: Option<&str>) -> Result<usize, Fin
         (_, []) => {
             let finding = Finding::new(
                 &resolved.source.file,
-                "the scenario has no goals, and so no motion to one",
+                "the scenario has no goals, and therefore no motion",
             );
             Err(finding
                 .key("goals")
@@ -151,7 +153,7 @@ fn goal_of(resolved: &ResolvedScenario, name: Option<&str>) -> Result<usize, Fin
         (None, [_]) => Ok(0),
         (None, several) => refuse(
             format!(
-                "the scenario has {} goals, and one motion is of one",
+                "the scenario has {} goals; a motion is exported for one",
                 several.len()
             ),
             format!("name one of them: --goal NAME, with {}", names()),
@@ -166,7 +168,7 @@ fn goal_of(resolved: &ResolvedScenario, name: Option<&str>) -> Result<usize, Fin
     }
 }
 
-/// Index of the configuration that is wanted, if it works.
+/// Index of the requested configuration, if it is feasible.
 fn chosen(report: &Report, wanted: Option<Configuration>) -> Result<usize, Finding> {
     let goal = &report.goals[0];
     // The file is put in by the caller.
@@ -178,8 +180,8 @@ fn chosen(report: &Report, wanted: Option<Configuration>) -> Result<usize, Findi
         .map(|each| each.label)
         .collect();
     let those = match working.as_slice() {
-        [] => "none works".to_owned(),
-        some => format!("those that work: {}", some.join(", ")),
+        [] => "no configuration is feasible".to_owned(),
+        some => format!("feasible: {}", some.join(", ")),
     };
     let label = match (wanted, &goal.recommended) {
         (Some(wanted), _) => wanted.label(),
@@ -189,9 +191,9 @@ fn chosen(report: &Report, wanted: Option<Configuration>) -> Result<usize, Findi
             let why: Vec<String> = each
                 .map(|each| format!("{}: {}", each.label, why_not(report, each)))
                 .collect();
-            let message = format!("no configuration works for goal `{}`", goal.name);
+            let message = format!("no configuration is feasible for goal `{}`", goal.name);
             return Err(refuse(message).hint(format!(
-                "only motions that work are exported; {}",
+                "only feasible motions are exported; {}",
                 why.join("; ")
             )));
         }
@@ -206,11 +208,11 @@ fn chosen(report: &Report, wanted: Option<Configuration>) -> Result<usize, Findi
         return Ok(index);
     }
     let why = why_not(report, found);
-    let message = format!("{label} does not work for goal `{}`: {why}", goal.name);
-    Err(refuse(message).hint(format!("only motions that work are exported; {those}")))
+    let message = format!("{label} is not feasible for goal `{}`: {why}", goal.name);
+    Err(refuse(message).hint(format!("only feasible motions are exported; {those}")))
 }
 
-/// Why a configuration does not work.
+/// Why a configuration is not feasible.
 fn why_not(report: &Report, configuration: &ConfigurationReport) -> String {
     if let Some(first) = configuration.rejections.first() {
         return format!("{}: {}", rule_in_words(first.rule), first.detail);
@@ -220,9 +222,9 @@ fn why_not(report: &Report, configuration: &ConfigurationReport) -> String {
         .iter()
         .find(|each| !each.pass && each.label.as_deref() == Some(configuration.label));
     missed.map_or_else(
-        || "it misses a criterion of the scenario".to_owned(),
+        || "fails a criterion of the scenario".to_owned(),
         |each| {
-            let mut words = format!("it misses {}", each.criterion);
+            let mut words = format!("fails {}", each.criterion);
             if !each.detail.is_empty() {
                 let _ = write!(words, ": {}", each.detail);
             }

@@ -1,7 +1,8 @@
 //! The first stage: plans of all goals, and which motions are worth a simulation.
 
+use needlebench_cell::Rule;
 use needlebench_parallel::in_parallel;
-use needlebench_planning::{ConfigurationPlan, GoalPlan, Rule};
+use needlebench_planning::{ConfigurationPlan, GoalPlan};
 
 use crate::control::Control;
 use crate::setup::Setup;
@@ -28,20 +29,35 @@ impl Job {
     }
 }
 
-/// Plans of all goals.
-pub(crate) fn plan_goals(setup: &Setup<'_>, control: &Control<'_>) -> Vec<GoalPlan> {
+/// Plans of all goals, and what is done with them.
+#[derive(Debug)]
+pub(crate) struct Planned {
+    /// By goal.
+    pub goals: Vec<GoalPlan>,
+    /// Motions that are simulated: the feasible ones, and on request those that are rejected for collisions only.
+    pub simulated: Vec<Job>,
+    /// Those that no rule rejects.
+    pub feasible: Vec<Job>,
+}
+
+/// Plans all goals.
+pub(crate) fn plan_goals(setup: &Setup<'_>, control: &Control<'_>) -> Planned {
     let goals = &setup.resolved.goals;
     control.progress.message("planning");
     control.progress.expect(goals.len() as u64);
-    in_parallel(control.threads, goals, |goal| {
+    let goals = in_parallel(control.threads, goals, |goal| {
         let plan = setup.planner.plan(goal);
         control.progress.step();
         plan
-    })
+    });
+    Planned {
+        simulated: simulated(setup, &goals),
+        feasible: feasible(&goals),
+        goals,
+    }
 }
 
-/// Configurations that are simulated: those that work, and on request those that only collide.
-pub(crate) fn jobs(setup: &Setup<'_>, plans: &[GoalPlan]) -> Vec<Job> {
+fn simulated(setup: &Setup<'_>, plans: &[GoalPlan]) -> Vec<Job> {
     let everything = setup.resolved.scenario.planning.simulate_rejected;
     let worth = |plan: &ConfigurationPlan| {
         plan.trajectory.is_some()
@@ -61,8 +77,7 @@ pub(crate) fn jobs(setup: &Setup<'_>, plans: &[GoalPlan]) -> Vec<Job> {
     all(plans).filter(|job| worth(job.plan(plans))).collect()
 }
 
-/// Configurations that work.
-pub(crate) fn working(plans: &[GoalPlan]) -> Vec<Job> {
+fn feasible(plans: &[GoalPlan]) -> Vec<Job> {
     let works = |plan: &ConfigurationPlan| plan.rejections.is_empty() && plan.trajectory.is_some();
     all(plans).filter(|job| works(job.plan(plans))).collect()
 }

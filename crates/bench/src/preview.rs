@@ -5,15 +5,15 @@
 //! clearances. Motions and engines can only take configurations away, so a goal for which too few are left
 //! here fails in every run.
 
-use needlebench_cell::{
-    Cell, ClearanceClass, Finding, Goal, ResolvedScenario, part_in_words, reason_in_words,
-};
+use needlebench_cell::{Cell, ClearanceClass, Rule, part_in_words, reason_in_words};
 use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_evaluation::report::{ConfigurationReport, RejectionReport, RouteReport};
 use needlebench_evaluation::{first_missed_by_posture, route_is_expected};
+use needlebench_input::Finding;
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_planning::{Member, Planner, Rule, crossed_fissures};
+use needlebench_planning::{Member, Planner, crossed_fissures};
+use needlebench_scenario::{Goal, ResolvedScenario};
 use serde::Serialize;
 
 use crate::assemble::{rejection_report, route_report};
@@ -47,12 +47,12 @@ pub struct StartPreview {
 pub struct GoalPreview {
     /// Its name.
     pub name: String,
-    /// Configurations whose final posture breaks no rule and no criterion on clearances.
+    /// Configurations whose final posture violates no rule and no criterion on clearances.
     pub working: usize,
     /// All eight.
     pub configurations: Vec<ConfigurationPreview>,
-    /// How the needle keeps away from bone, vessels and organs; none where there is nothing to keep away
-    /// from. Configurations are looked at as if it did.
+    /// Clearance of the needle from bone, vessels and organs; none where there is nothing to keep away from.
+    /// Configurations are looked at as if it did.
     pub needle_route: Option<RouteReport>,
     /// Fissures of the lungs that the needle crosses.
     pub fissures_crossed: Vec<String>,
@@ -65,11 +65,11 @@ pub struct GoalPreview {
 pub struct ConfigurationPreview {
     /// Its label.
     pub label: &'static str,
-    /// Its final posture breaks nothing.
+    /// Its final posture violates nothing.
     pub works: bool,
-    /// Rules that it breaks, the first failing one first.
+    /// Rules that it violates, the first failing one first.
     pub rejections: Vec<RejectionReport>,
-    /// The first criterion that it misses, if it breaks no rule.
+    /// The first criterion that it fails, if it violates no rule.
     pub missed: Option<&'static str>,
     /// The posture that was looked at, if the pose is in reach.
     pub joints_rad: Option<[f64; 6]>,
@@ -89,7 +89,7 @@ pub struct NearestPair {
 }
 
 impl NearestPair {
-    /// Of arm and tool; the needle corridor is no body.
+    /// Of arm and tool; the access zone is not a body.
     fn of(minima: &ClassMinima, cell: &Cell) -> Option<Self> {
         let bodies = minima
             .iter()
@@ -106,7 +106,7 @@ impl NearestPair {
 }
 
 impl ConfigurationPreview {
-    /// The first rule or criterion that it breaks; empty if it works.
+    /// The first rule or criterion that it violates; empty if it is feasible.
     pub fn reason(&self) -> &str {
         let rule = self.rejections.first().map(|rejection| rejection.rule);
         rule.or(self.missed).unwrap_or_default()
@@ -254,7 +254,7 @@ fn goal_key(resolved: &ResolvedScenario, index: usize) -> String {
     format!("goals[{index}].{key}")
 }
 
-/// A goal for which fewer configurations are left than the scenario wants.
+/// A goal with fewer feasible configurations than the scenario requires.
 fn reach_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) -> Option<Finding> {
     let wanted = resolved.scenario.criteria.min_working_configurations as usize;
     if goal.working >= wanted {
@@ -270,7 +270,7 @@ fn reach_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
     let message = if let Some(missing_m) = missing_m {
         let least_m = missing_m.into_iter().fold(f64::INFINITY, f64::min);
         format!(
-            "goal `{}` is out of reach: in every configuration {:.1} mm or more are missing ({BASIS})",
+            "goal `{}` is out of reach by {:.1} mm or more in every configuration ({BASIS})",
             goal.name,
             least_m * 1e3
         )
@@ -285,7 +285,7 @@ fn reach_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
             }
         }
         format!(
-            "{} of 8 configurations can work for goal `{}`, and {wanted} are wanted: {} ({BASIS})",
+            "{} of 8 configurations feasible for goal `{}`, {wanted} required: {} ({BASIS})",
             goal.working,
             goal.name,
             reasons.join(", ")
@@ -295,14 +295,15 @@ fn reach_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
         Finding::new(&resolved.source.file, message)
             .key(goal_key(resolved, index))
             .hint(format!(
-                "move the base, the patient or the entry: `needlebench suggest {}` proposes places and entries; \
-                 `min_working_configurations` under [criteria] is how many have to work",
+                "move the base, the patient or the entry; `needlebench suggest {}` proposes base \
+                 placements and entries; `min_working_configurations` under [criteria] sets the \
+                 required number",
                 resolved.source.file
             )),
     )
 }
 
-/// A needle that does not keep away from what it should, unless just that is expected.
+/// A needle path that violates its margins, unless exactly that is expected.
 fn route_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) -> Option<Finding> {
     let route = goal.needle_route.as_ref()?;
     let wanted_mm = resolved.scenario.criteria.min_clearance_mm.needle_route;
@@ -316,12 +317,13 @@ fn route_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
     let mm = route.distance_m * 1e3;
     let message = if mm < 0.0 {
         format!(
-            "the needle of goal `{}` goes {:.1} mm deep through {words} ({tissue}, `{part}`)",
+            "needle path of goal `{}`: {:.1} mm deep in {words} ({tissue}, `{part}`)",
             goal.name, -mm
         )
     } else {
         format!(
-            "the needle of goal `{}` passes {words} ({tissue}, `{part}`) at {mm:.1} mm, nearer than {:.1} mm",
+            "needle path of goal `{}`: {mm:.1} mm clearance to {words} ({tissue}, `{part}`), {:.1} \
+             mm required",
             goal.name,
             limit_m * 1e3
         )
@@ -330,8 +332,8 @@ fn route_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
         Finding::new(&resolved.source.file, message)
             .key(goal_key(resolved, index))
             .hint(format!(
-                "choose another entry: `needlebench suggest {}` proposes some; `off` under [planning.needle_route] \
-                 names what the needle may pass",
+                "choose another entry; `needlebench suggest {}` proposes some; `off` under \
+                 [planning.needle_route] lists what the needle may pass",
                 resolved.source.file
             )),
     )

@@ -1,10 +1,10 @@
-//! How far the work is, for whoever watches it.
+//! Progress of the work.
 
 /// Watches long work. Every method does nothing unless it is implemented.
 pub trait Progress: Sync {
     /// What is being done now.
     fn message(&self, _text: &str) {}
-    /// Something that is worth saying where nobody watches too: an engine is set up, or mended.
+    /// A message that is also written without a progress display: an engine is set up or repaired.
     fn notice(&self, text: &str) {
         self.message(text);
     }
@@ -16,7 +16,7 @@ pub trait Progress: Sync {
     fn step(&self) {}
 }
 
-/// Nobody watches.
+/// Without a display.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 

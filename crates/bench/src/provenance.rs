@@ -1,10 +1,11 @@
 //! Where a result's numbers come from.
 
-use needlebench_cell::{ModelSource, ResolvedScenario, sha256_hex};
 use needlebench_engine::EngineIdentity;
 use needlebench_evaluation::report::{InputFile, Provenance};
+use needlebench_input::{ModelSource, sha256_hex};
+use needlebench_scenario::ResolvedScenario;
 
-/// Lock file of the build; empty where it was not built in its workspace, and nobody knows.
+/// Lock file of the build; empty where it was not built in its workspace.
 const CARGO_LOCK: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/Cargo.lock"));
 
 /// Version of the program with its git revision.
@@ -43,14 +44,14 @@ pub fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentity>) -> 
     };
     let mut inputs = vec![
         input("scenario", &resolved.source),
-        input("robot", &resolved.cell.robot.source),
-        input("tool", &resolved.cell.tool.source),
+        input("robot", &resolved.robot_description.source),
+        input("tool", &resolved.tool_source),
     ];
-    let arm = resolved.cell.robot.arm.as_ref();
+    let arm = resolved.robot_description.arm.as_ref();
     inputs.extend(arm.map(|used| input("arm data", &used.arm.source)));
-    let calibration = resolved.cell.robot.calibration.as_ref();
+    let calibration = resolved.robot_description.calibration.as_ref();
     inputs.extend(calibration.map(|applied| input("calibration", &applied.source)));
-    let meshes = &resolved.cell.robot.meshes;
+    let meshes = &resolved.robot_description.meshes;
     inputs.extend(meshes.iter().map(|source| input("robot mesh", source)));
     inputs.extend(
         resolved
@@ -78,16 +79,15 @@ pub fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentity>) -> 
         inputs,
         seed: resolved.scenario.seed,
         truth: if resolved.scenario.imperfections.is_none() && resolved.imperfections.is_some() {
-            "nominal robot whose controller believes in another gravity: errors are those of that \
-             belief, of inverse kinematics, control and simulation"
+            "nominal robot whose controller assumes another gravity: errors of that assumption, \
+             inverse kinematics, control and simulation"
         } else if resolved.imperfections.is_some() {
-            "an imperfect robot and phantom, drawn from the seed: errors are those of the \
-             scenario's imperfections, of control and of simulation"
+            "imperfect robot and phantom, sampled by the seed: errors of the scenario's \
+             imperfections, control and simulation"
         } else if calibration.is_some() {
-            "factory-calibrated robot: errors are those of inverse kinematics, control and \
-             simulation"
+            "factory-calibrated robot: errors of inverse kinematics, control and simulation"
         } else {
-            "nominal robot: errors are those of inverse kinematics, control and simulation"
+            "nominal robot: errors of inverse kinematics, control and simulation"
         },
     }
 }

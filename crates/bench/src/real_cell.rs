@@ -1,22 +1,22 @@
 //! The cell as it really is in a run: the nominal one, or one draw of the scenario's imperfections.
 
 use nalgebra::Point3;
-use needlebench_cell::{Cell, ClearanceClass, Goal, PlacedPhantom, ResolvedScenario};
+use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Actuation, Servo, ServoGains};
 use needlebench_evaluation::report::TruthReport;
 use needlebench_evaluation::{ClearanceSeries, NeedleMeasurement, measure_needle};
-use needlebench_kinematics::Joints;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::registration::RegistrationError;
-use needlebench_kinematics::rotation_vector;
 use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_kinematics::{Joints, rotation_vector};
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::{Goal, PlacedPhantom, ResolvedScenario};
 use needlebench_uncertainty::{Layout, Settled, Truth, settle_after};
 
 /// Keeps the draw of imperfections apart from the other things that a scenario's seed decides.
 const STREAM: u64 = 0x7472_7574_6821;
 
-/// What the engines simulate and the measurements are held against.
+/// What the engines simulate and the measurements are compared with.
 pub struct RealCell<'a> {
     resolved: &'a ResolvedScenario,
     nominal: &'a ClearanceModel,
@@ -131,7 +131,7 @@ impl<'a> RealCell<'a> {
         })
     }
 
-    /// Takes off the proven bounds what the skin may come nearer in another phase of the breath.
+    /// Subtracts from the certified bounds what the skin may approach in another breathing phase.
     pub(crate) fn allow_for_breath(&self, series: &mut ClearanceSeries) {
         let Some(Imperfect { truth, .. }) = &self.imperfect else {
             return;
@@ -152,8 +152,8 @@ impl<'a> RealCell<'a> {
         }
     }
 
-    /// What the balance of torques predicts of the end of a motion, without any engine; none for the
-    /// nominal robot, and where a drive is too weak.
+    /// Static equilibrium at the end of a motion, without any engine; none for the nominal robot, and where a drive is
+    /// too weak.
     pub fn predicted(&self, goal: usize, trajectory: &JointTrajectory) -> Option<PredictedNeedle> {
         let Imperfect { truth, cell, .. } = self.imperfect.as_ref()?;
         let nominal = &self.resolved.cell;
@@ -202,7 +202,7 @@ pub(crate) fn drawn_truth(resolved: &ResolvedScenario) -> Option<Result<Truth, R
     ))
 }
 
-/// The servo as it believes the robot, and gravity, to be.
+/// The servo as it assumes the robot, and gravity, to be.
 pub fn servo_of(resolved: &ResolvedScenario) -> Servo {
     let settings = &resolved.servo;
     let believed = resolved.gravity.believed();

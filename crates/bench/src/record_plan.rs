@@ -1,6 +1,5 @@
-//! What is known of a run that excites every joint before it is made, for people and programs.
+//! What is known of an excitation run before it is made.
 
-use needlebench_cell::ResolvedScenario;
 use needlebench_evaluation::certified_clearance;
 use needlebench_evaluation::excitation::MotionReport;
 use needlebench_evaluation::report::ClearanceReport;
@@ -8,6 +7,7 @@ use needlebench_kinematics::JOINT_LABELS;
 use needlebench_planning::excitation::{
     CalibrationInformation, ExcitationPlan, FoundRun, IDENTIFIED_SHARE, Identification, NOISE,
 };
+use needlebench_scenario::ResolvedScenario;
 use serde::Serialize;
 
 use crate::excitation::motions;
@@ -35,11 +35,11 @@ pub struct PlanReport {
     pub tool_kg: f64,
     /// Duration with one payload, s.
     pub duration_s: f64,
-    /// Least clearance from everything else that is asked for, m.
+    /// Required clearance from everything else, m.
     pub clearance_limit_m: f64,
-    /// Least clearance from itself that is asked for, m.
+    /// Required self-clearance, m.
     pub self_clearance_limit_m: f64,
-    /// Proven clearances of all motions together.
+    /// Certified clearances of all motions together.
     pub planned: ClearanceReport,
     /// Motion by motion.
     pub motions: Vec<MotionReport>,
@@ -150,7 +150,7 @@ impl PlanReport {
         Self {
             schema_version: 1,
             scenario: resolved.scenario.name.clone(),
-            arm: resolved.cell.robot.arm_name(),
+            arm: resolved.robot_description.arm_name.clone(),
             seed,
             postures: protocol.postures.len(),
             over_start: found.detours,

@@ -13,16 +13,16 @@ use crate::setup::Setup;
 pub struct RtdeSource {
     servo: Servo,
     actuation: Actuation,
-    /// The real arm's, which its controller has as the maker's calibration.
+    /// The real arm's, which its controller has as the manufacturer's calibration.
     chain: Chain,
-    /// What the controller believes to be at the flange.
+    /// What the controller assumes to be at the flange.
     payload: Body,
     constants_nm_a: Option<[f64; JOINT_COUNT]>,
 }
 
 /// A log by the names of UR's real-time data exchange (RTDE).
 ///
-/// Targets, torque and payload are what the controller believes. `actual_q` is what the encoders read, and both poses
+/// Targets, torque and payload are what the controller assumes. `actual_q` is what the encoders read, and both poses
 /// are of the *real* arm's lengths at such readings, since a controller has its arm's calibration: so what a log says
 /// of lengths is how the real arm differs from the nominal one. The poses are of the flange (a TCP of zero), in the
 /// controller's `base` frame.
@@ -30,7 +30,7 @@ pub struct RtdeSource {
 pub struct RtdeLog {
     /// Rows, in the order of time.
     pub rows: Vec<RtdeRow>,
-    /// Mass at the flange that the controller believes in, kg.
+    /// Mass at the flange that the controller assumes, kg.
     pub payload_kg: f64,
     /// Its centre in the flange frame, m.
     pub payload_cog_m: [f64; 3],
@@ -62,10 +62,10 @@ pub struct RtdeRow {
 }
 
 impl RtdeSource {
-    /// Of a run; `payload` is what the controller believes to be at the flange.
+    /// Of a run; `payload` is what the controller assumes to be at the flange.
     pub(crate) fn of(setup: &Setup<'_>) -> Self {
         let cell: &Cell = &setup.resolved.cell;
-        let used = cell.robot.arm.as_ref();
+        let used = setup.resolved.robot_description.arm.as_ref();
         let motors = used.and_then(|used| used.arm.data.motors.as_ref());
         Self {
             servo: setup.servo,

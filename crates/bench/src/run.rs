@@ -1,4 +1,4 @@
-//! The whole way of one scenario: plan, simulate, stage events, adjudicate, budget, assemble.
+//! The whole pipeline of one scenario: plan, simulate, stage events, adjudicate, budget, assemble.
 //!
 //! Each stage is a module that takes what the stages before it made; see [`run`].
 
@@ -6,8 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use needlebench_cell::study::StudyMode;
-use needlebench_cell::{ClearanceClass, ResolvedScenario};
+use needlebench_cell::ClearanceClass;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
 use needlebench_evaluation::report::{
@@ -19,6 +18,8 @@ use needlebench_evaluation::{
 };
 use needlebench_parallel::in_parallel;
 use needlebench_planning::GoalPlan;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::study::StudyMode;
 
 use crate::adjudication::Adjudicator;
 use crate::assemble::{Results, assemble};
@@ -27,7 +28,7 @@ use crate::control::Control;
 use crate::events::{self, EventRun};
 use crate::excitation;
 use crate::iso9283;
-use crate::plan::{Job, jobs, plan_goals};
+use crate::plan::{Job, Planned, plan_goals};
 use crate::progress::{Progress, Silent};
 use crate::rtde::RtdeSource;
 use crate::runnable::Runnable;
@@ -70,9 +71,9 @@ pub fn run(
 }
 
 /// Beginning of the note on criteria that the choice of engines leaves out.
-pub const LEFT_OUT: &str = "not judged, since the command chose";
+pub const LEFT_OUT: &str = "not evaluated, as the command selects";
 
-/// What engines differ by takes two of them. Where one ran alone, the criteria on it are not judged; where it was
+/// What engines differ by takes two of them. Where one ran alone, the criteria on it are not evaluated; where it was
 /// the command that left the other one out, a note says which those are.
 fn judge_alone(
     report: &mut Report,
@@ -96,17 +97,17 @@ fn judge_alone(
         return;
     }
     let reason = format!(
-        "it takes two engines, and the scenario runs {} alone",
+        "requires two engines; the scenario runs {} alone",
         only.name()
     );
     leave_open(report, &keys, &reason);
 }
 
-/// Nothing is known of the clearance of a part that has no shape: no class that it belongs to is judged.
+/// The clearance of a part without a shape is unknown: no class that it belongs to is evaluated.
 fn judge_unseen(report: &mut Report, resolved: &ResolvedScenario) {
     for (class, parts) in &resolved.cell.unseen {
         let key = format!("min_clearance_mm.{}", class.name());
-        let reason = format!("no collision shape is known of {}", parts.join(", "));
+        let reason = format!("no collision shape known for {}", parts.join(", "));
         // What the other parts miss is missed.
         report
             .criteria
@@ -115,8 +116,8 @@ fn judge_unseen(report: &mut Report, resolved: &ResolvedScenario) {
     }
 }
 
-/// A criterion that is asked for and that nothing in the scenario can be judged by, as the clearance of a gantry that is
-/// not in the room, is not judged.
+/// A required criterion for which the scenario has no value, such as the clearance of a gantry that is not in the
+/// room, is not evaluated.
 fn judge_absent(report: &mut Report, resolved: &ResolvedScenario, engines: &[&'static dyn Engine]) {
     let moved = |goal: &GoalReport| {
         let mut all = goal.configurations.iter();
@@ -141,15 +142,15 @@ fn judge_absent(report: &mut Report, resolved: &ResolvedScenario, engines: &[&'s
                     && pairs.iter().all(|pair| pair.class != *class)
             });
             let reason = match absent.and_then(|class| class.name().strip_prefix("robot_")) {
-                Some(body) => format!("there is no {body} in the room"),
-                None => "nothing has a value for it".to_owned(),
+                Some(body) => format!("no {body} in the room"),
+                None => "no value available".to_owned(),
             };
             leave_open(report, &[key], &reason);
         }
     }
 }
 
-/// Criteria of all that moved are not judged.
+/// Criteria of all that moved are not evaluated.
 fn leave_open(report: &mut Report, keys: &[&str], reason: &str) {
     let mut subjects: Vec<(String, Option<String>)> = Vec::new();
     if report.iso9283.is_some() {
@@ -203,21 +204,26 @@ fn run_goals(
     let model = ClearanceModel::new(&resolved.cell);
     let setup = Setup::new(resolved, &model)?;
     let pool = EnginePool::new(engines);
-    let plans = plan_while_engines_start(&setup, &pool, engines, control);
+    let planned = plan_while_engines_start(&setup, &pool, engines, control);
     timings.lap("planning_s");
-    tell_plans(resolved, &plans);
+    let plans = &planned.goals;
+    tell_plans(resolved, plans);
 
-    let jobs = jobs(&setup, &plans);
-    tracing::info!(motions = jobs.len(), "simulates in each engine");
+    tracing::info!(
+        motions = planned.simulated.len(),
+        "simulates in each engine"
+    );
     let simulation = Simulation {
         setup: &setup,
-        plans: &plans,
-        jobs: &jobs,
+        plans,
+        jobs: &planned.simulated,
         detail: Detail::Series,
         restart: false,
     };
     control.progress.message("simulating");
-    control.progress.expect((jobs.len() * engines.len()) as u64);
+    control
+        .progress
+        .expect((planned.simulated.len() * engines.len()) as u64);
     let simulated = in_parallel(control.threads, engines, |engine| {
         simulation.run_in(&pool, *engine, control)
     });
@@ -227,19 +233,19 @@ fn run_goals(
         timings.of_engine(made);
     }
 
-    let (events, event_failures) = run_events(&setup, &plans, &pool, engines, control);
+    let (events, event_failures) = run_events(&setup, &planned, &pool, engines, control);
     let failures = simulated
         .iter()
         .filter_map(|made| made.failure(&simulation));
     let failures: Vec<EngineFailure> = failures.chain(event_failures).collect();
     let mut identities: Vec<EngineIdentity> = Vec::new();
     identities.extend(simulated.iter().filter_map(|made| made.identity.clone()));
-    let (runs, stopped) = by_configuration(&plans, simulated);
+    let (runs, stopped) = by_configuration(plans, simulated);
 
     let refereed = Instant::now();
     let adjudicator = Adjudicator {
         setup: &setup,
-        plans: &plans,
+        plans,
         runs: &runs,
         engines,
         pool: &pool,
@@ -256,11 +262,11 @@ fn run_goals(
         failures = failures.len(),
         "events staged"
     );
-    let budgets = budgets(&setup, &plans, control.threads);
+    let budgets = budgets(&setup, plans, control.threads);
     tracing::info!("error budgets computed");
     let interrupted = control.is_cancelled();
     let results = Results {
-        plans: &plans,
+        plans,
         runs: &runs,
         events: &events,
         budgets: &budgets,
@@ -273,15 +279,14 @@ fn run_goals(
     let mut report = assemble(&setup, results);
     report.notes.extend(adjudications.notes);
     if interrupted {
-        report.notes.push(
-            "the run was interrupted: motions that had not been simulated by then are missing"
-                .to_owned(),
-        );
+        report
+            .notes
+            .push("run interrupted: motions not simulated by then are missing".to_owned());
     }
     let real_arm = RealArm::of(setup.real.cell());
     Ok(ScenarioRun {
         report,
-        plans,
+        plans: planned.goals,
         runs,
         events,
         stopped,
@@ -299,7 +304,7 @@ fn tell_plans(resolved: &ResolvedScenario, plans: &[GoalPlan]) {
         let _stage = tracing::info_span!("plan", goal = %goal.name).entered();
         for each in &plan.configurations {
             match each.rejections.first() {
-                None => tracing::info!(configuration = %each.configuration, "works"),
+                None => tracing::info!(configuration = %each.configuration, "feasible"),
                 Some(first) => tracing::info!(
                     configuration = %each.configuration,
                     rule = first.rule.name(),
@@ -307,7 +312,7 @@ fn tell_plans(resolved: &ResolvedScenario, plans: &[GoalPlan]) {
                     limit = first.limit,
                     unit = first.unit,
                     detail = first.detail,
-                    "cannot work"
+                    "infeasible"
                 ),
             }
         }
@@ -320,8 +325,8 @@ fn plan_while_engines_start(
     pool: &EnginePool,
     engines: &[&'static dyn Engine],
     control: &Control<'_>,
-) -> Vec<GoalPlan> {
-    let settings = &setup.resolved.scenario.engines;
+) -> Planned {
+    let settings = &setup.resolved.scenario.engines.settings();
     std::thread::scope(|scope| {
         for engine in engines {
             scope.spawn(move || {
@@ -334,17 +339,25 @@ fn plan_while_engines_start(
     })
 }
 
-/// Stages the events of all configurations that work, and simulates them in all engines.
+/// Stages the events of all feasible configurations, and simulates them in all engines.
 fn run_events(
     setup: &Setup<'_>,
-    plans: &[GoalPlan],
+    planned: &Planned,
     pool: &EnginePool,
     engines: &[&'static dyn Engine],
     control: &Control<'_>,
 ) -> (Vec<EventRun>, Vec<EngineFailure>) {
-    let mut staged = events::stage(setup, plans, control.threads);
+    let mut staged = events::stage(setup, planned, control.threads);
     let done = in_parallel(control.threads, engines, |engine| {
-        events::simulate(setup, plans, &staged, pool, *engine, false, control)
+        events::simulate(
+            setup,
+            &planned.goals,
+            &staged,
+            pool,
+            *engine,
+            false,
+            control,
+        )
     });
     let mut failures = Vec::new();
     for (engine, done) in engines.iter().zip(done) {

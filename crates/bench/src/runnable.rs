@@ -1,12 +1,13 @@
 //! A scenario that is fit to be run, or why it is not.
 
-use needlebench_cell::{Finding, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
+use needlebench_input::Finding;
 use needlebench_planning::excitation::{ExcitationError, ExcitationPlan, plan_excitation};
 use needlebench_planning::iso9283::{ProtocolError, ProtocolPlan, plan_protocol};
+use needlebench_scenario::ResolvedScenario;
 
-/// A scenario, with the plan of its test by ISO 9283 or of its excitation if it has one: a plan that cannot be made is found
-/// before anything long begins, and nobody makes it again.
+/// A scenario, with the plan of its test by ISO 9283 or of its excitation if it has one: a plan that cannot be made is
+/// found before anything long begins, and it is not made again.
 #[derive(Debug, Clone)]
 pub struct Runnable {
     resolved: ResolvedScenario,
@@ -59,7 +60,7 @@ impl Runnable {
         self.protocol.as_ref()
     }
 
-    /// The plan of the run that excites every joint, if it has one.
+    /// The plan of the excitation run, if it has one.
     pub fn excitation(&self) -> Option<&Result<ExcitationPlan, ExcitationError>> {
         self.excitation.as_ref()
     }
@@ -83,12 +84,12 @@ impl Runnable {
         let depth_mm = -pair.separation.distance_m * 1e3;
         let finding = Finding::new(
             file,
-            format!("the start posture collides: {a} is {depth_mm:.1} mm inside {b}"),
+            format!("the start posture collides: {a} penetrates {b} by {depth_mm:.1} mm"),
         );
         Some(
             finding
                 .key("start.joints_deg")
-                .hint("choose another start posture, or move what it hits"),
+                .hint("choose another start posture, or move the obstacle"),
         )
     }
 }

@@ -1,12 +1,13 @@
 //! What is asked of a run, and what it leaves.
 
-use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Cell, ResolvedScenario};
+use needlebench_cell::Cell;
 use needlebench_engine::{ENGINES, Engine, UnknownEngine, choose_engines};
-use needlebench_evaluation::iso9283::{Arrival, Attained, Commanded};
 use needlebench_evaluation::report::Report;
+use needlebench_iso9283::{Arrival, Attained, Commanded};
 use needlebench_kinematics::{Chain, Pose};
 use needlebench_planning::GoalPlan;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::scenario::EngineName;
 
 use crate::events::EventRun;
 use crate::rtde::{RtdeLog, RtdeSource};
@@ -22,7 +23,7 @@ pub struct RunOptions {
     pub engines: Option<Vec<EngineName>>,
     /// Threads; more than there are engines and goals is no use.
     pub jobs: usize,
-    /// Whether to hold every simulated motion against the referee.
+    /// Whether to hold every simulated motion against the reference integrator.
     pub referee: bool,
 }
 
@@ -72,13 +73,13 @@ pub struct ScenarioRun {
     pub plans: Vec<GoalPlan>,
     /// Recordings, by goal, configuration and engine.
     pub runs: Vec<Vec<Vec<EngineRun>>>,
-    /// Events of the configurations that work.
+    /// Events of the feasible configurations.
     pub events: Vec<EventRun>,
     /// Motions that an engine could not carry on, until then.
     pub stopped: Vec<StoppedRun>,
     /// What a test by ISO 9283 left besides its report.
     pub iso9283: Option<ProtocolRun>,
-    /// What a run that excites every joint left besides its report.
+    /// What an excitation run left besides its report.
     pub excitation: Option<ExcitationRun>,
     /// What makes logs of the recordings; none where there are none.
     pub rtde: Option<RtdeSource>,
@@ -110,7 +111,7 @@ pub struct ProtocolRun {
     pub limit_band_m: f64,
 }
 
-/// What a simulated run that excites every joint leaves besides its report.
+/// What a simulated excitation run leaves besides its report.
 #[derive(Debug)]
 pub struct ExcitationRun {
     /// Engine, number of the payload from 0, and the log.

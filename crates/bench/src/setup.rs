@@ -1,12 +1,12 @@
 //! What all stages of a run, and of a study's case, work with.
 
-use needlebench_cell::ResolvedScenario;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Keep, Motion, MotionJob, MotionSettings, Servo};
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::Planner;
+use needlebench_scenario::ResolvedScenario;
 
 use crate::real_cell::{RealCell, servo_of};
 
@@ -29,7 +29,7 @@ pub(crate) struct Setup<'a> {
     pub planner: Planner<'a>,
     /// The cell that is simulated and measured.
     pub real: RealCell<'a>,
-    /// The servo as it believes the robot to be.
+    /// The servo as it assumes the robot to be.
     pub servo: Servo,
 }
 
@@ -68,7 +68,7 @@ impl<'a> Setup<'a> {
     }
 
     /// How motions are made.
-    pub(crate) fn motion_settings(&self) -> MotionSettings<'_> {
-        MotionSettings::new(&self.resolved.scenario.engines)
+    pub(crate) fn motion_settings(&self) -> MotionSettings {
+        MotionSettings::new(&self.resolved.scenario.engines.settings())
     }
 }

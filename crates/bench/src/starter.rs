@@ -5,9 +5,10 @@
 
 use std::path::Path;
 
-use needlebench_cell::{
-    Finding, Overrides, ResolvedScenario, ScenarioFamily, part_in_words, resolve_open_scenario,
-    resolve_scenario,
+use needlebench_cell::part_in_words;
+use needlebench_input::Finding;
+use needlebench_scenario::{
+    Overrides, ResolvedScenario, ScenarioFamily, resolve_open_scenario, resolve_scenario,
 };
 
 use crate::Runnable;
@@ -42,13 +43,13 @@ impl Template {
     /// What it is, for people.
     pub fn in_words(self) -> &'static str {
         match self {
-            Self::Table => "robot on a column beside the CT table, patient on the back",
-            Self::Hanging => "robot hanging from the ceiling, patient on the back",
-            Self::Lateral => "robot on a column behind a patient on the left side",
+            Self::Table => "robot on a column beside the CT table, patient supine",
+            Self::Hanging => "robot mounted on the ceiling, patient supine",
+            Self::Lateral => "robot on a column behind a patient in left lateral position",
         }
     }
 
-    /// The lesion that is aimed at unless somebody names one: one that this place of the robot serves well.
+    /// The default lesion: one that is feasible from this base placement.
     pub fn lesion(self) -> &'static str {
         match self {
             Self::Table | Self::Lateral => "pleural_based",
@@ -73,7 +74,7 @@ impl Template {
     }
 }
 
-/// What is wanted.
+/// The request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StarterOptions {
     /// Name of the scenario, and of its file without `.toml`.
@@ -95,7 +96,7 @@ pub struct Starter {
     pub text: String,
     /// Its entry.
     pub entry: Entry,
-    /// Its place, if the template's usual one does not serve.
+    /// Its place, if the template's default is infeasible.
     pub place: Option<Place>,
 }
 
@@ -137,7 +138,7 @@ pub fn starter(
     Ok(Starter { text, entry, place })
 }
 
-/// What to do where nothing works.
+/// What to do where no configuration is feasible.
 const OTHERS: &str =
     "choose another --lesion, --from or --arm; `needlebench init --list` shows what there is";
 
@@ -164,7 +165,7 @@ fn entry_at(
     Ok((resolved, entry.ok_or((why, best))))
 }
 
-/// A place from which the goal's best route can be served.
+/// A placement from which the goal's best path is feasible.
 fn place_for(
     mut resolved: ResolvedScenario,
     entry: FoundEntry,
@@ -215,14 +216,14 @@ fn text(
         }
         Template::Hanging => {
             "[mount]\nkind = \"ceiling\" # or column, wedge, table_rail, wall\nceiling_height_mm = 2700 # over the floor\n\n\
-             # Where every motion starts: folded under the base. Shoulder pan to wrist 3.\n[start]\njoints_deg = [0, -20, \
+             # Start posture of every motion: folded under the base. Shoulder pan to wrist 3.\n[start]\njoints_deg = [0, -20, \
              -140, -20, 90, 0]\n"
         }
     };
     let looks = match template {
-        Template::Table => "270: it looks at the patient from the right",
-        Template::Hanging => "180 first: its foot is up",
-        Template::Lateral => "270: it looks at the patient's back",
+        Template::Table => "270: the robot faces the patient from the right",
+        Template::Hanging => "180 first: mounted upside down",
+        Template::Lateral => "270: the robot faces the patient's back",
     };
     let right = match template {
         Template::Table | Template::Hanging => "y towards the patient's right",
@@ -239,13 +240,13 @@ fn text(
         let margins = entry.margins.iter();
         let margins = margins.map(|each| {
             let (distance_mm, part) = (each.distance_m * 1e3, part_in_words(&each.part));
-            format!("\n# {distance_mm:.1} mm from {part} ({})", each.tissue)
+            format!("\n# {distance_mm:.1} mm to {part} ({})", each.tissue)
         });
         let margins = margins.collect::<Vec<_>>().concat();
         let [azimuth, elevation] = entry.direction_deg;
         format!(
             "# Where the needle enters, as seen from the target: azimuth (0 front, 90 patient's left, -90 right) and\n\
-             # elevation (90 towards the head), deg. Here the needle goes {:.0} mm deep and passes{margins}\n\
+             # elevation (90 towards the head), deg. Here the needle path is {:.0} mm deep and has clearances of{margins}\n\
              # `needlebench suggest {name}.toml` proposes others; a point is `entry_mm = [left, posterior, superior]`.\n\
              entry_direction_deg = [{azimuth}, {elevation}]\n",
             entry.depth_m * 1e3
@@ -253,18 +254,19 @@ fn text(
     });
     format!(
         r#"#:schema ./scenario.schema.json
-# {about}. `needlebench run {name}.toml` says which of the arm's eight
-# configurations bring the needle guide to its place, how far off the needle's tip is, and how near anything comes.
+# {about}. `needlebench run {name}.toml` reports the feasible arm
+# configurations, the tip error and all clearances.
 #
-# Change first: the patient and the lesion ([phantom], [[goals]]), then where the robot stands ([robot]); after each
-# change `needlebench check {name}.toml` says in a moment what can work. Every key that is left out has a default;
-# scenario.schema.json describes all of them, and editors that know the line at the top show it.
+# Change first: the patient and the lesion ([phantom], [[goals]]), then the base placement ([robot]); after each change
+# `needlebench check {name}.toml` lists the feasible configurations within seconds. Omitted keys have defaults;
+# scenario.schema.json describes all keys, and editors that support the line at the top show them.
 #
-# Lengths are in mm, angles in deg, as keys say. World: x towards the patient's head, {right},
-# z up from the floor. Points of the patient: from mid-chest, x to the patient's left, y to the back, z to the head.
+# Lengths are in mm, angles in deg, as the keys state. World frame: x towards the patient's head,
+# {right}, z up from the floor. Points of the patient: from mid-chest, x to the patient's
+# left, y to the back, z to the head.
 name = "{name}"
 description = "A first scenario: {about_small}."
-seed = 1 # of everything random: the same seed gives the same results
+seed = 1 # seed of all random numbers: the same seed gives the same results
 
 [robot]
 urdf = "{arm}" # ur3, ur3e, ur5e, or the path of a URDF of another UR arm
@@ -273,17 +275,17 @@ base_rpy_deg = {rpy} # roll, pitch, yaw; {looks}
 
 {mount}
 [tool]
-urdf = "perpendicular" # the guide leaves the wrist sideways; or offset, inline, or the path of a URDF
-needle_length_mm = 200 # hub to tip: guide (50), stand-off and depth have to fit
+urdf = "perpendicular" # guide axis perpendicular to the wrist; or offset, inline, or the path of a URDF
+needle_length_mm = 200 # hub to tip: guide (50), stand-off and depth must fit
 
 [phantom]
-model = "{phantom}" # size of the patient: `needlebench init --list` names all
+model = "{phantom}" # size of the patient: `needlebench init --list` lists all
 posture = "{posture}" # or supine, prone, left-lateral, right-lateral
 {cushion}arms = "overhead" # or beside, none
-head = true # whether the robot has to keep clear of a head
+head = true # include the head as an obstacle
 
 [table]
-center_mm = [-300, 0] # middle of its upper face: legs and head lie on it
+center_mm = [-300, 0] # centre of its upper face, which supports legs and head
 top_height_mm = {top_mm} # of the upper face over the floor
 
 # One [[goals]] for each needle.
@@ -292,16 +294,16 @@ name = "{lesion}"
 lesion = "{lesion}" # its centre is the target; a point is `target_mm = [left, posterior, superior]`
 {goal}standoff_mm = 15 # from the guide's exit to the skin
 
-# A posture or a motion nearer than this to anything, or to the arm itself, is rejected.
+# Postures and motions with a smaller clearance or self-clearance are rejected.
 [planning]
 min_clearance_mm = 5
 min_self_clearance_mm = 5
 
-# What every configuration that works has to reach.
+# Limits for every feasible configuration.
 [criteria]
-max_tip_position_error_mm = 0.1 # in the engines, of an arm that is as its controller believes
-max_peak_torque_ratio = 1.0 # of the joints' limits
-min_working_configurations = 1 # of eight
+max_tip_position_error_mm = 0.1 # simulated, of the nominal arm
+max_peak_torque_ratio = 1.0 # relative to the joints' limits
+min_working_configurations = 1 # feasible, of eight
 "#,
         about = capitalised(template.in_words()),
         about_small = template.in_words(),
@@ -322,13 +324,13 @@ fn capitalised(text: &str) -> String {
 pub fn starter_study(scenario: &str) -> String {
     format!(
         r#"#:schema ./study.schema.json
-# How much may the patient's place be off? `needlebench study {scenario}_study.toml` looks at {scenario}.toml with the
-# patient moved and turned, and says in how many of these layouts each configuration works.
+# How much may the patient be displaced? `needlebench study {scenario}_study.toml` evaluates {scenario}.toml with the
+# patient moved and rotated, and reports in how many of these layouts each configuration is feasible.
 name = "{scenario}_study"
 scenario = "{scenario}.toml"
 seed = 1
 mode = "static" # final postures; planned: motions too; dynamic: in the engines
-replanned_cases = 8 # of these layouts are planned too, to say what postures overstate
+replanned_cases = 8 # layouts that are also planned, to measure how much postures alone overestimate
 
 [sampling]
 method = "sobol"

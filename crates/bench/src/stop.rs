@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use needlebench_cell::Finding;
 use needlebench_imaging::ImagingError;
+use needlebench_input::Finding;
 
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq)]

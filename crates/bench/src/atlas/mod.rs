@@ -1,15 +1,15 @@
-//! The atlas of a goal: branch x roll, what works, how much room there is, and why not.
+//! The roll map of a goal: feasibility of each branch over the roll, margins, and reasons for rejection.
 
 mod report;
 
 use std::f64::consts::TAU;
 
-use needlebench_cell::{Goal, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::{Aim, Family, Member, Planner, route_rejection};
+use needlebench_scenario::{Goal, ResolvedScenario};
 
 pub use report::{AtlasReport, BranchReport, GoalAtlasReport};
 
@@ -27,13 +27,13 @@ pub struct GoalAtlas {
 }
 
 impl GoalAtlas {
-    /// Some configuration works at some roll.
+    /// Some configuration is feasible at some roll.
     pub fn works(&self) -> bool {
         self.families.iter().any(|family| !family.ranges.is_empty())
     }
 }
 
-/// Computes the atlas of a goal: postures only, no motions. The same for any number of threads.
+/// Computes the roll map of a goal: postures only, no motions. The same for any number of threads.
 ///
 /// # Errors
 /// [`NotUrGeometry`] if the robot is not a UR arm.

@@ -1,16 +1,17 @@
-//! The atlas as JSON.
+//! The roll map as JSON.
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::{Cell, Goal, ResolvedScenario, Roll};
+use needlebench_cell::Cell;
 use needlebench_evaluation::report::Provenance;
 use needlebench_planning::{Best, Edge, Member, RollRange};
+use needlebench_scenario::{Goal, ResolvedScenario, Roll};
 use serde::Serialize;
 
 use super::GoalAtlas;
 use crate::provenance::provenance;
 
-/// Atlas of a scenario's goals.
+/// Roll maps of a scenario's goals.
 #[derive(Debug, Serialize)]
 pub struct AtlasReport {
     /// Version of this layout.
@@ -35,12 +36,12 @@ impl AtlasReport {
     }
 }
 
-/// Atlas of one goal.
+/// Roll map of one goal.
 #[derive(Debug, Serialize)]
 pub struct GoalAtlasReport {
     /// Name of the goal.
     pub name: String,
-    /// The roll that the goal fixes, if it does; the atlas is of all rolls all the same.
+    /// The roll that the goal fixes, if it does; the roll map covers all rolls in either case.
     pub fixed_roll_rad: Option<f64>,
     /// What rolls are chosen for.
     pub aim: &'static str,
@@ -55,16 +56,16 @@ pub struct GoalAtlasReport {
 pub struct BranchReport {
     /// Label of the configuration.
     pub label: &'static str,
-    /// Ranges of the roll in which it works.
+    /// Ranges of the roll in which it is feasible.
     pub ranges: Vec<RangeReport>,
     /// Least clearance of the final posture at each roll, intended stand-off left out; null where
     /// there is no posture.
     pub least_clearance_m: Vec<Option<f64>>,
     /// Its class.
     pub class: Vec<Option<&'static str>>,
-    /// First rule that rejects the posture at each roll; null where it works.
+    /// First rule that rejects the posture at each roll; null where it is feasible.
     pub rule: Vec<Option<&'static str>>,
-    /// Least distance from breaking a rule, negative where one is broken.
+    /// Constraint margin: least distance from violating a rule, negative where one is violated.
     pub surplus_m: Vec<f64>,
     /// Margin to the joint limits by roll, 0 to 1.
     pub joint_margin: Vec<Option<f64>>,
@@ -113,7 +114,7 @@ pub struct BestReport {
 }
 
 impl GoalAtlasReport {
-    /// The atlas of a goal, as computed.
+    /// The roll map of a goal, as computed.
     pub fn new(cell: &Cell, goal: &Goal, atlas: &GoalAtlas) -> Self {
         let branches = atlas
             .families

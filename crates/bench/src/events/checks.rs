@@ -1,16 +1,16 @@
 //! Limits that a scenario sets for its events.
 
-use needlebench_cell::scenario::EventsSection;
 use needlebench_evaluation::events::EventsReport;
 use needlebench_evaluation::report::{CriterionResult, Judged};
 use needlebench_evaluation::{UNCOMPARED, unmeasured_by};
+use needlebench_scenario::scenario::EventsSection;
 
 /// What a missing value means.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Missing {
-    /// It was looked for and never came: the limit is missed.
+    /// It never occurred: the limit is exceeded.
     Never,
-    /// It was to be measured: the limit is not judged.
+    /// It was to be measured: the limit is not evaluated.
     Unjudged,
 }
 

@@ -1,5 +1,5 @@
-//! The third stage: contacts, a stop and the way back, where a scenario asks for them. They are staged
-//! once, simulated in each engine, and put into the report.
+//! The third stage: contacts, a stop and the retreat, where a scenario asks for them. They are staged once, simulated
+//! in each engine, and put into the report.
 
 mod checks;
 mod report;
@@ -10,13 +10,13 @@ pub(crate) use report::events_report;
 pub(crate) use simulate::simulate;
 pub(crate) use stage::stage;
 
-use needlebench_cell::ResolvedScenario;
-use needlebench_cell::arm::BrakeFigures;
-use needlebench_cell::scenario::EventsSection;
+use needlebench_cell::BrakeFigures;
 use needlebench_engine::{Brakes, Recording};
 use needlebench_evaluation::events::StopEnvelope;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_planning::{PressError, PressPlan};
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::scenario::EventsSection;
 
 /// Events of one configuration, with what the engines made of them.
 #[derive(Debug)]

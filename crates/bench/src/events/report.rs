@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::scenario::PressSection;
-use needlebench_cell::{Goal, ResolvedScenario};
 use needlebench_engine::Recording;
 use needlebench_evaluation::events::{
     BRAKES_FIT, EventsReport, PressReport, RIGID_FORCE_MEANS, StopBrakes, StopReport,
@@ -12,6 +10,8 @@ use needlebench_evaluation::events::{
 use needlebench_evaluation::largest_over_pairs;
 use needlebench_evaluation::report::Judged;
 use needlebench_planning::{ConfigurationPlan, PressError, PressPlan};
+use needlebench_scenario::scenario::PressSection;
+use needlebench_scenario::{Goal, ResolvedScenario};
 
 use super::checks::checks;
 use super::{EngineEvents, EventRun, section};

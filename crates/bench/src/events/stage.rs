@@ -1,25 +1,25 @@
 //! What is to happen, without any engine.
 
-use needlebench_cell::ArmInUse;
-use needlebench_cell::scenario::{PressSection, StopSection};
 use needlebench_engine::Brakes;
 use needlebench_evaluation::events::stopping_envelope;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_parallel::in_parallel;
-use needlebench_planning::{GoalPlan, PressError, PressPlan, stage_press};
+use needlebench_planning::{PressError, PressPlan, stage_press};
+use needlebench_robot::ArmInUse;
+use needlebench_scenario::scenario::{PressSection, StopSection};
 
 use super::{EventRun, StagedStop};
-use crate::plan::{Job, working};
+use crate::plan::{Job, Planned};
 use crate::real_cell::RealCell;
 use crate::setup::Setup;
 
-/// Stages the events of every configuration that works.
-pub(crate) fn stage(setup: &Setup<'_>, plans: &[GoalPlan], threads: usize) -> Vec<EventRun> {
+/// Stages the events of every feasible configuration.
+pub(crate) fn stage(setup: &Setup<'_>, planned: &Planned, threads: usize) -> Vec<EventRun> {
     let Some(events) = &setup.resolved.scenario.events else {
         return Vec::new();
     };
-    in_parallel(threads, &working(plans), |&job| {
-        let trajectory = job.plan(plans).trajectory.as_ref();
+    in_parallel(threads, &planned.feasible, |&job| {
+        let trajectory = job.plan(&planned.goals).trajectory.as_ref();
         let trajectory = trajectory.expect("what works has a motion");
         let Job {
             goal,
@@ -64,7 +64,12 @@ fn stage_stop(
     stop: &StopSection,
 ) -> StagedStop {
     let (cell, goal) = (setup.real.cell(), setup.real.goal(goal));
-    let figures = cell.robot.arm.as_ref().and_then(ArmInUse::brakes);
+    let figures = setup
+        .resolved
+        .robot_description
+        .arm
+        .as_ref()
+        .and_then(ArmInUse::brakes);
     let figures = figures.filter(|_| stop.category < 2);
     let brakes = figures
         .as_ref()

@@ -5,20 +5,21 @@ mod simulate;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use needlebench_cell::iso9283::Iso9283Protocol;
-use needlebench_cell::{ArmInUse, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
 use needlebench_evaluation::iso9283::{
-    Commanded, EngineMeasurement, Iso9283Report, ProtocolSummary, SUBJECT, StabilisationReport,
-    drift, evaluate, judge,
+    EngineMeasurement, Iso9283Report, ProtocolSummary, SUBJECT, StabilisationReport, judge,
 };
 use needlebench_evaluation::report::{
     CriterionResult, EngineFailure, Report, SCHEMA_VERSION, ScenarioSummary, Verdict,
 };
 use needlebench_evaluation::{EngineDifference, pairs};
+use needlebench_iso9283::{Commanded, drift, evaluate};
 use needlebench_parallel::in_parallel;
 use needlebench_planning::iso9283::{ProtocolError, ProtocolPlan};
+use needlebench_robot::ArmInUse;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::iso9283::Iso9283Protocol;
 
 use crate::assemble::{assumed, notes};
 use crate::control::Control;
@@ -29,8 +30,7 @@ use simulate::{Cycles, EngineCycles};
 
 /// Runs the protocol of a scenario that has one.
 ///
-/// A protocol that cannot be carried out is a missed criterion here; commands find it while they
-/// read the scenario.
+/// A protocol that cannot be carried out is a failed criterion here; commands find it while they read the scenario.
 pub(crate) fn run(
     resolved: &ResolvedScenario,
     plan: &Result<ProtocolPlan, ProtocolError>,
@@ -130,7 +130,7 @@ fn simulate_engines(
     control: &Control<'_>,
 ) -> Vec<(&'static str, Result<EngineCycles, String>)> {
     let pool = EnginePool::new(engines);
-    let settings = &setup.resolved.scenario.engines;
+    let settings = &setup.resolved.scenario.engines.settings();
     let sequences = 1 + u64::from(plan.directional.is_some());
     control.progress.message("simulating");
     let cycles = u64::from(protocol.cycles) * sequences;
@@ -164,14 +164,14 @@ fn measurement(
         .expect("every pose is commanded and visited at least twice");
     let remark = if statistics.nothing_random {
         Some(
-            "RP = 0 because nothing random is switched on: the first two cycles, each with its own \
-             seed, are equal bit for bit"
+            "RP = 0 because no random effects are enabled: the first two cycles, each with its own \
+             seed, are bit-identical"
                 .to_owned(),
         )
     } else if cycles.repeats_itself {
         Some(
-            "the robot repeats itself bit for bit, since nothing random is switched on: the spread \
-             is the tracker's noise alone"
+            "the robot motion is bit-identical, as no random effects are enabled: the spread is \
+             tracker noise only"
                 .to_owned(),
         )
     } else {
@@ -264,7 +264,11 @@ pub(crate) fn empty_report(
         iso9283: None,
         excitation: None,
         engine_failures: Vec::new(),
-        arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
+        arm: resolved
+            .robot_description
+            .arm
+            .as_ref()
+            .map(ArmInUse::report),
         gravity: resolved.gravity.clone(),
         enclosure: Vec::new(),
         assumed: assumed(resolved),

@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::iso9283::Iso9283Protocol;
 use needlebench_engine::{
     Actuation, Engine, EngineError, EngineIdentity, EnginePool, Hooks, Motion, MotionJob,
     Recording, run_motions,
 };
-use needlebench_evaluation::iso9283::{Arrival, Attained, Effort, measure_cycle};
-use needlebench_kinematics::random::{NormalPairs, SplitMix64};
+use needlebench_evaluation::iso9283::{Effort, measure_cycle};
+use needlebench_iso9283::{Arrival, Attained};
+use needlebench_numerics::random::{NormalPairs, SplitMix64};
 use needlebench_planning::iso9283::{Cycle, ProtocolPlan};
+use needlebench_scenario::iso9283::Iso9283Protocol;
 
 use crate::control::Control;
 use crate::setup::Setup;

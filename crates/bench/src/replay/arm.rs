@@ -2,10 +2,11 @@
 //! for.
 
 use nalgebra::{Matrix3, Vector3};
-use needlebench_cell::{BodyKind, Cell, NeedleCorridor, ResolvedScenario, Tool};
+use needlebench_cell::{BodyKind, Cell, NeedleCorridor, Tool};
 use needlebench_engine::{Actuation, JointFriction, Servo, ServoGains};
 use needlebench_kinematics::{Body, JOINT_COUNT, JOINT_LABELS, Joints};
 use needlebench_recorded::{Identification, Load, RecordedRun};
+use needlebench_scenario::ResolvedScenario;
 
 use crate::servo_of;
 
@@ -40,7 +41,7 @@ impl ReplayedArm {
         let mut words = Vec::new();
         let rotors = rotors(resolved, identification, &mut words);
         let loads: Vec<Option<Load>> = if run.loads.is_empty() {
-            words.push("load: the scenario's tool, for the log says nothing of it".to_owned());
+            words.push("load: the scenario's tool, as the log has no payload".to_owned());
             vec![None]
         } else {
             let kg: Vec<String> = run
@@ -48,7 +49,7 @@ impl ReplayedArm {
                 .iter()
                 .map(|(_, load)| format!("{} kg", load.mass_kg))
                 .collect();
-            words.push(format!("load: as the log has it, {}", kg.join(", ")));
+            words.push(format!("load: from the log, {}", kg.join(", ")));
             run.loads.iter().map(|(_, load)| Some(*load)).collect()
         };
         let cells: Vec<Cell> = loads
@@ -64,7 +65,7 @@ impl ReplayedArm {
             .as_ref()
             .is_some_and(|controller| !controller.has_tensors);
         if as_points {
-            words.push("feed-forward: links as points, as the controller has them".to_owned());
+            words.push("feed-forward: links as point masses, as in the controller".to_owned());
         }
         let servos = cells
             .iter()
@@ -85,7 +86,11 @@ impl ReplayedArm {
             })
             .collect();
         let friction = friction(resolved, identification, &mut words);
-        let data = resolved.cell.robot.arm.as_ref().map(|used| &used.arm.data);
+        let data = resolved
+            .robot_description
+            .arm
+            .as_ref()
+            .map(|used| &used.arm.data);
         let of_data = data.and_then(|data| data.motors.as_ref());
         let of_log = identification.current.as_ref();
         Self {
@@ -120,7 +125,11 @@ fn believed_gravity(
         ));
         return down * found;
     }
-    let data = resolved.cell.robot.arm.as_ref().map(|used| &used.arm.data);
+    let data = resolved
+        .robot_description
+        .arm
+        .as_ref()
+        .map(|used| &used.arm.data);
     let of_data = data.and_then(|data| data.gravity.as_ref());
     match (resolved.scenario.controller.gravity_m_s2, of_data) {
         (None, Some(of_data)) => {
@@ -152,7 +161,8 @@ fn softened(gains: &mut ServoGains, rotors: &Joints, timestep_s: f64, words: &mu
     }
     if !soft.is_empty() {
         words.push(format!(
-            "servo gains are scaled down where rotors are too light for them at steps of {} ms: {}",
+            "servo gains are reduced where rotor inertia is too small for them at steps of {} ms: \
+             {}",
             timestep_s * 1e3,
             soft.join(", ")
         ));
@@ -183,8 +193,8 @@ fn rotors(
     });
     if !senseless.is_empty() {
         words.push(format!(
-            "rotor inertia identified at {} is not positive, or next to nothing: not used; do the torques \
-             of the log belong to its motion?",
+            "rotor inertia identified at {} is not positive or negligible, not used; check that \
+             the torques of the log belong to its motion",
             senseless.join(", ")
         ));
     }
@@ -205,9 +215,13 @@ fn friction(
     identification: &Identification,
     words: &mut Vec<String>,
 ) -> Option<JointFriction> {
-    let data = resolved.cell.robot.arm.as_ref().map(|used| &used.arm.data);
+    let data = resolved
+        .robot_description
+        .arm
+        .as_ref()
+        .map(|used| &used.arm.data);
     let Some(known) = data.and_then(|data| data.friction.as_ref()) else {
-        words.push("friction: none, for the arm's data have none".to_owned());
+        words.push("friction: none, as the arm's data have none".to_owned());
         return None;
     };
     let law = identification.current.as_ref();
@@ -223,9 +237,10 @@ fn friction(
         known.viscous_nms_rad,
     );
     words.push(format!(
-        "friction: {}, and the controller makes up for all of it while a joint moves",
+        "friction: {}, fully compensated by the controller while a joint moves",
         if law.is_some() {
-            "sliding and viscous as identified from this log where it shows them, else the arm's data"
+            "Coulomb and viscous, identified from this log where identifiable, otherwise the arm's \
+             data"
         } else {
             "the arm's data"
         }

@@ -1,11 +1,11 @@
 //! What a log says of an arm, as data that scenarios use: `[robot] arm = "my_arm.toml"`.
 
-use needlebench_cell::arm::data::{
-    ArmData, FrictionData, GravityData, MotorData, OwnCalibration, RotorData,
-};
-use needlebench_cell::{Calibration, Robot};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS};
 use needlebench_recorded::Estimate;
+use needlebench_robot::arm::data::{
+    ArmData, FrictionData, GravityData, MotorData, OwnCalibration, RotorData,
+};
+use needlebench_robot::{Calibration, RobotDescription};
 
 use super::ReplayReport;
 
@@ -27,7 +27,11 @@ pub struct ArmFiles {
 ///
 /// None where the arm has no data to start from. `calibration_file` is the name by which the data call the
 /// calibration.
-pub fn arm_files(report: &ReplayReport, robot: &Robot, calibration_file: &str) -> Option<ArmFiles> {
+pub fn arm_files(
+    report: &ReplayReport,
+    robot: &RobotDescription,
+    calibration_file: &str,
+) -> Option<ArmFiles> {
     let used = robot.arm.as_ref()?;
     let of_type = &used.arm.data;
     let log = &report.log;
@@ -77,7 +81,7 @@ pub fn arm_files(report: &ReplayReport, robot: &Robot, calibration_file: &str) -
     );
     let friction = of_type.friction.as_ref().map(|known| {
         let coulomb = merge(
-            "sliding friction",
+            "Coulomb friction",
             joints(&|joint| {
                 let of_law = law.map(|law| law.joints[joint].coulomb_nm);
                 let real = measured.map(|fit| fit.coulomb_nm[joint]);
@@ -129,8 +133,7 @@ pub fn arm_files(report: &ReplayReport, robot: &Robot, calibration_file: &str) -
         calibration: calibration.map(|fit| OwnCalibration {
             file: calibration_file.to_owned(),
             source: format!(
-                "{whence}: poses that it has not seen are met within {:.2e} mm rms, by nominal lengths \
-                 within {:.3} mm",
+                "{whence}: RMS error at held-out poses {:.2e} mm, with nominal lengths {:.3} mm",
                 fit.held_out.rms_m * 1e3,
                 fit.nominal_held_out.rms_m * 1e3
             ),
@@ -149,7 +152,8 @@ pub fn arm_files(report: &ReplayReport, robot: &Robot, calibration_file: &str) -
         }
     }
     let comment = format!(
-        "One {}, by needlebench replay of {}. What the run does not show is that of its type.",
+        "One {}, identified by needlebench replay of {}. Parameters not identifiable from the run \
+         are those of its type.",
         of_type.name, log.source.file
     );
     Some(ArmFiles {
@@ -157,7 +161,7 @@ pub fn arm_files(report: &ReplayReport, robot: &Robot, calibration_file: &str) -
         calibration: calibration.map(|fit| {
             let comment = format!(
                 "Joint origins of one {}, fitted to poses of {}\n\
-                 (SHA-256 {}). As its controller believes, not as measured from outside.",
+                 (SHA-256 {}). As assumed by its controller, not measured externally.",
                 of_type.name, log.source.file, log.source.sha256
             );
             Calibration::written(&fit.chain, &comment)
@@ -198,7 +202,7 @@ fn merged(
     let mut source = format!("{whence}, 95 %: {}", of_log.join(", "));
     if let (false, Some((_, known))) = (of_type.is_empty(), known) {
         source = format!(
-            "{source}; {}, which the run does not show: {known}",
+            "{source}; {}, not identifiable from the run: {known}",
             of_type.join(", ")
         );
     }
@@ -234,14 +238,14 @@ fn friction(
             friction.stiction_nm[joint] = friction.stiction_nm[joint].max(*value);
         }
         friction.coulomb_nm = values;
-        source.push(format!("sliding {of}"));
+        source.push(format!("Coulomb {of}"));
     }
     if let Some((values, of)) = viscous {
         friction.viscous_nms_rad = values.map(|value| value.max(0.0));
         source.push(format!("viscous {of}"));
     }
     if !source.is_empty() {
-        source.push(format!("the rest: {}", known.source));
+        source.push(format!("others: {}", known.source));
         friction.source = source.join("; ");
     }
     friction

@@ -1,9 +1,9 @@
 //! Whether a recorded run and its replay are as near as they are to be.
 
-use needlebench_cell::requirements::{Requirements, requirement_of};
-use needlebench_cell::scenario::ReplaySection;
 use needlebench_evaluation::report::{CriterionResult, NotJudged, Verdict};
 use needlebench_recorded::LogKind;
+use needlebench_scenario::requirements::{Requirements, requirement_of};
+use needlebench_scenario::scenario::ReplaySection;
 
 use super::ReplayReport;
 
@@ -25,9 +25,8 @@ pub(super) fn judge(
     if let Some(limit) = criteria.max_moment_rms_nm {
         let controller = report.identification.controller.as_ref();
         let largest = controller.map(|fit| fit.held_out_rms_nm.into_iter().fold(0.0, f64::max));
-        let detail =
-            "largest rms over joints that the identified arm leaves of target_moment, held out";
-        let missing = "the log has no target_moment, or no target_q";
+        let detail = "largest RMS residual of target_moment over joints, identified arm, held-out";
+        let missing = "the log has no target_moment or no target_q";
         judge.add(
             "max_moment_rms_nm",
             None,
@@ -41,8 +40,8 @@ pub(super) fn judge(
     if let Some(limit) = criteria.max_calibration_mm {
         let calibration = report.calibration.as_ref();
         let (value, limit) = (calibration.map(|fit| fit.held_out.rms_m), limit * 1e-3);
-        let detail = "rms error of the calibration, held out";
-        let missing = "the log has no poses of the tool's point";
+        let detail = "RMS calibration error, held-out";
+        let missing = "the log has no TCP poses";
         judge.add(
             "max_calibration_mm",
             None,
@@ -56,11 +55,11 @@ pub(super) fn judge(
     for engine in engines {
         let replay = report.engines.get(engine);
         let missing = if report.log.kind == LogKind::Simulator {
-            "it is a simulator's log"
+            "the log is of a simulator"
         } else if report.real.is_none() {
             "the log has no target_q, so nothing was replayed"
         } else {
-            "the engine did not replay it"
+            "not replayed by the engine"
         };
         if let Some(limit) = criteria.max_tracking_mm {
             let against = replay.and_then(|replay| replay.against_real.as_ref());
@@ -80,11 +79,11 @@ pub(super) fn judge(
             let currents = replay.map(|replay| replay.current_rms_a.iter().flatten().copied());
             let value = currents.and_then(|values| values.reduce(f64::max));
             let missing = if replay.is_some() {
-                "no measured currents, or no torque constants"
+                "no measured currents or no torque constants"
             } else {
                 missing
             };
-            let detail = "largest rms over joints of simulated less measured current";
+            let detail = "largest RMS of simulated minus measured current over joints";
             judge.add(
                 "max_current_rms_a",
                 Some(engine),

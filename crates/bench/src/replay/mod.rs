@@ -14,15 +14,16 @@ mod pieces;
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
-use needlebench_cell::scenario::ReplaySection;
-use needlebench_cell::{Finding, ResolvedScenario};
 use needlebench_engine::{Engine, EngineIdentity, EnginePool};
 use needlebench_evaluation::report::{CriterionResult, EngineFailure, NotJudged, Verdict};
+use needlebench_input::Finding;
 use needlebench_kinematics::{Joints, UrGeometry};
 use needlebench_recorded::{
     ArmFit, CalibrationFit, Estimate, Identification, KnownArm, LogKind, LogSource, RecordedRun,
     Tracking, arm_fits, calibrate, identify, tracking,
 };
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::scenario::ReplaySection;
 use serde::Serialize;
 
 use crate::control::Control;
@@ -64,9 +65,9 @@ pub struct ReplayReport {
     pub replayed: Vec<String>,
     /// Engines that failed.
     pub engine_failures: Vec<EngineFailure>,
-    /// Criteria that were judged.
+    /// Criteria that were evaluated.
     pub criteria: Vec<CriterionResult>,
-    /// Criteria that could not be judged, and why.
+    /// Criteria that could not be evaluated, and why.
     pub not_judged: Vec<NotJudged>,
     /// What follows.
     pub verdict: Verdict,
@@ -97,7 +98,7 @@ pub struct LogSummary {
 /// Which arm a log is of.
 #[derive(Debug, Clone, Serialize)]
 pub struct ArmSummary {
-    /// The maker's name.
+    /// The manufacturer's name.
     pub name: String,
     /// The arm's data.
     pub data: Option<String>,
@@ -152,10 +153,10 @@ pub fn replay(
     engines: &[&'static dyn Engine],
     control: &Control<'_>,
 ) -> Result<Replay, ReplayError> {
-    let robot = &resolved.cell.robot;
+    let (robot, description) = (&resolved.cell.robot, &resolved.robot_description);
     let fits = arm_fits(&run);
-    check_arm(&run, &fits, robot).map_err(Box::new)?;
-    let data = robot.arm.as_ref().map(|used| &used.arm.data);
+    check_arm(&run, &fits, &description.arm_name).map_err(Box::new)?;
+    let data = description.arm.as_ref().map(|used| &used.arm.data);
     let nominal =
         UrGeometry::of_chain(&robot.chain).map_or(robot.chain, |geometry| geometry.chain());
     control.progress.message("calibrating");
@@ -203,7 +204,7 @@ pub fn replay(
             control
                 .progress
                 .message(&format!("replaying in {}", engine.title()));
-            let settings = &resolved.scenario.engines;
+            let settings = &resolved.scenario.engines.settings();
             let mut tell = |text: &str| control.progress.notice(text);
             // Why it could not start is told again to whoever asks it for a motion.
             let _ = pool.start(*engine, settings, &mut tell);
@@ -234,8 +235,8 @@ pub fn replay(
             temperature_c: run.temperature_c,
         },
         arm: ArmSummary {
-            name: robot.arm_name(),
-            data: robot.arm.as_ref().map(|used| used.arm.path()),
+            name: description.arm_name.clone(),
+            data: description.arm.as_ref().map(|used| used.arm.path()),
             found: how_found.to_owned(),
             fits,
         },
@@ -268,12 +269,7 @@ pub fn replay(
 }
 
 /// Refuses a log that is of another arm.
-fn check_arm(
-    run: &RecordedRun,
-    fits: &[ArmFit],
-    robot: &needlebench_cell::Robot,
-) -> Result<(), Finding> {
-    let name = robot.arm_name();
+fn check_arm(run: &RecordedRun, fits: &[ArmFit], name: &str) -> Result<(), Finding> {
     let file = &run.source.file;
     let Some(best) = fits.first() else {
         return Ok(());
@@ -284,10 +280,10 @@ fn check_arm(
         return Ok(());
     }
     let off = fits.iter().find(|fit| fit.arm == name).map_or_else(
-        || format!("the {name}'s lengths are those of no known arm"),
+        || format!("the {name}'s lengths match no known arm"),
         |own| {
             format!(
-                "the {name}'s lengths are off its poses by {:.1} mm rms",
+                "RMS error of the {name}'s lengths at the log's poses: {:.1} mm",
                 own.rms_m * 1e3
             )
         },
@@ -296,21 +292,18 @@ fn check_arm(
         return Err(Finding::new(
             file,
             format!(
-                "the log's poses are those of no known arm: {off}, the {}'s, which fit best, by {:.1} mm",
+                "the log's poses match no known arm ({off}; best match {}, {:.1} mm)",
                 best.arm,
                 best.rms_m * 1e3
             ),
         )
-        .hint(
-            "are the angles and positions in the units that they seem to be, and did the tool's point \
-             stay the same?",
-        ));
+        .hint("check the units of angles and positions, and that the TCP did not change"));
     }
     if fits.iter().any(|fit| fit.arm == name) {
         return Err(Finding::new(
             file,
             format!(
-                "this is a {}'s log, and the arm is a {name}: {off}, the {}'s by {:.2} mm",
+                "the log is of a {}, but the arm is a {name} ({off}; {}: {:.2} mm)",
                 best.arm,
                 best.arm,
                 best.rms_m * 1e3
@@ -327,9 +320,9 @@ fn remarks(identification: &Identification, calibration: Option<&CalibrationFit>
     let mut notes = Vec::new();
     if let Some(fit) = calibration.filter(|fit| !fit.is_worth) {
         notes.push(format!(
-            "the calibration is not kept: on poses that it has not seen it is off by {:.3} mm rms, nominal \
-             lengths by {:.3} mm; the run has too few different poses (24 spread ones are enough: \
-             `needlebench record-plan`)",
+            "the calibration is not used: RMS error at held-out poses {:.3} mm, with nominal \
+             lengths {:.3} mm; the run has too few distinct poses (24 well-distributed ones \
+             suffice: `needlebench record-plan`)",
             fit.held_out.rms_m * 1e3,
             fit.nominal_held_out.rms_m * 1e3
         ));
@@ -347,8 +340,8 @@ fn remarks(identification: &Identification, calibration: Option<&CalibrationFit>
         };
         if rotors.iter().chain(masses).any(is_negative) {
             notes.push(format!(
-                "rotors or loads by {source} come out negative: these are not the torques of this arm on \
-                 this motion, and nothing identified from them should be trusted"
+                "negative rotor inertia or load identified from {source}: the torques do not match \
+                 this arm and motion, so no parameter identified from them is reliable"
             ));
         }
     }
@@ -368,10 +361,10 @@ fn remarks(identification: &Identification, calibration: Option<&CalibrationFit>
             && (a - b).abs() > da + db + 0.02 * a
         {
             notes.push(format!(
-                "the load by measured torques, {b:.3} +- {db:.3} kg, and the one that the controller \
-                 believes in, {a:.3} +- {da:.3} kg, differ by more than their intervals: either the load \
-                 was set wrongly, or friction depends on more than speed, which moves the first and not \
-                 the second"
+                "load from measured torques {b:.3} +- {db:.3} kg, load assumed by the controller \
+                 {a:.3} +- {da:.3} kg: the difference exceeds their intervals. Either the load was \
+                 set incorrectly, or friction depends on more than speed, which biases the first \
+                 only"
             ));
         }
     }

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use needlebench_cell::scenario::EnginesSection;
+use needlebench_cell::EngineSettings;
 use needlebench_engine::{
     Engine, EngineError, EngineIdentity, EnginePool, Hooks, Keep, Motion, MotionJob,
     MotionSettings, run_motions,
@@ -19,8 +19,8 @@ use crate::control::Control;
 /// Longest piece, s.
 const LONGEST_S: f64 = 20.0;
 
-/// A piece that starts in motion starts at rest in the engines: for so long the servo catches up, and
-/// nothing is compared, s. It swings at 6 Hz or more, damped at 0.6 or nearly so.
+/// A piece that starts in motion starts at rest in the engines: for this time, in s, the servo catches up and nothing
+/// is compared. The servo's natural frequency is 6 Hz or more, its damping ratio 0.6 or nearly so.
 const CATCHING_UP_S: f64 = 0.5;
 
 /// Pieces whose trajectories are there at a time.
@@ -38,7 +38,7 @@ struct Piece {
 pub(super) fn course(
     run: &RecordedRun,
     arm: &ReplayedArm,
-    engines: &EnginesSection,
+    engines: &EngineSettings,
     pool: &EnginePool,
     engine: &'static dyn Engine,
     control: &Control<'_>,
@@ -109,11 +109,11 @@ pub(super) fn course(
     }
     match (failed, identity) {
         (Some((row, error)), _) => Err(format!(
-            "from {:.2} s of the log on: {error}",
+            "from {:.2} s of the log: {error}",
             run.time_s[row] - run.time_s[0]
         )),
         (None, Some(identity)) => Ok((identity, course)),
-        (None, None) => Err("the log has no two rows without a gap between them".to_owned()),
+        (None, None) => Err("the log has no two consecutive rows without a gap".to_owned()),
     }
 }
 

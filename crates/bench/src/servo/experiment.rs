@@ -321,8 +321,8 @@ pub fn whole(value: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_cell::{Overrides, load_scenario};
     use needlebench_engine::{RapierPlant, RapierSettings, ServoGains};
+    use needlebench_scenario::{Overrides, load_scenario};
 
     use super::*;
 

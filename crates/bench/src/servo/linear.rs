@@ -207,8 +207,8 @@ fn last_stable(stable: impl Fn(f64) -> bool) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_cell::{Overrides, load_scenario};
     use needlebench_engine::ServoGains;
+    use needlebench_scenario::{Overrides, load_scenario};
 
     use super::*;
 

@@ -1,5 +1,5 @@
-//! The servo as its maker would describe it: settings with their sources, the closed loop at a
-//! posture, and its responses to steps and sines in the engines beside those of the linear loop.
+//! The servo as its manufacturer would describe it: settings with their sources, the closed loop at a posture, and its
+//! responses to steps and sines in the engines beside those of the linear loop.
 
 pub mod experiment;
 pub mod linear;

@@ -1,8 +1,9 @@
 //! Gains, limits and default speeds, each with where it comes from.
 
-use needlebench_cell::scenario::MotionSection;
-use needlebench_cell::{Recognition, ResolvedScenario};
 use needlebench_engine::Servo;
+use needlebench_robot::Recognition;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::scenario::MotionSection;
 use serde::Serialize;
 
 /// One line of the servo's data sheet.
@@ -14,7 +15,7 @@ pub struct Setting {
     pub unit: &'static str,
     /// Per joint, or one value for all.
     pub values: Vec<f64>,
-    /// Where it comes from; begins with `assumed` where nobody published it.
+    /// Where it comes from; begins with `assumed` where it was not published.
     pub source: String,
 }
 
@@ -22,7 +23,7 @@ pub struct Setting {
 pub fn settings(resolved: &ResolvedScenario, servo: &Servo) -> Vec<Setting> {
     let scenario = &resolved.scenario;
     let chosen_servo = &resolved.servo;
-    let robot = &resolved.cell.robot;
+    let robot = &resolved.robot_description;
     // The numbers of an arm's own URDF are traced in its data; of others only the file is known.
     let own = robot.arm.as_ref();
     let own = own.filter(|used| used.recognition == Recognition::Own);
@@ -73,7 +74,7 @@ pub fn settings(resolved: &ResolvedScenario, servo: &Servo) -> Vec<Setting> {
             resolved.gravity.world_source.clone(),
         ),
         per_joint(
-            "gravity that the controller believes",
+            "gravity assumed by the controller",
             "m/s^2",
             vec![resolved.gravity.believed_m_s2],
             resolved.gravity.believed_source.clone(),
@@ -87,7 +88,14 @@ pub fn settings(resolved: &ResolvedScenario, servo: &Servo) -> Vec<Setting> {
         per_joint(
             "speed limit",
             "rad/s",
-            robot.limits.velocities_rad_s().iter().copied().collect(),
+            resolved
+                .cell
+                .robot
+                .limits
+                .velocities_rad_s()
+                .iter()
+                .copied()
+                .collect(),
             model(
                 "velocity limits",
                 traced.map(|limits| &limits.velocity_source),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use needlebench_cell::{Overrides, ScenarioEdit, ScenarioFamily, resolve_scenario};
+use needlebench_scenario::{Overrides, ScenarioEdit, ScenarioFamily, resolve_scenario};
 
 /// The scenario of a file, with some direction in place of the first goal's entry.
 pub fn entering_by_direction(path: &Path) -> ScenarioFamily {

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use needlebench_bench::study::{StudyColumns, dynamic_rows};
 use needlebench_bench::{RunError, RunOptions, ScenarioRun, run_scenario};
-use needlebench_cell::study::StudyMode;
-use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
 use needlebench_engine::{ENGINES, Engine, EnginePool, choose_engines};
+use needlebench_scenario::study::StudyMode;
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 use serde_json::{Value, json};
 
 use crate::replay::Replay;

@@ -6,8 +6,6 @@ use std::process::Command;
 
 use needlebench_bench::study::{CaseRow, StudyColumns, dynamic_rows, planned_rows};
 use needlebench_bench::{RunOptions, run_scenario};
-use needlebench_cell::study::StudyMode;
-use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{
     Actuation, ENGINES, Engine, EnginePool, Hooks, RapierPlant, RapierSettings, Servo, ServoGains,
@@ -18,6 +16,8 @@ use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
 use needlebench_evaluation::{certify_recording, measure_clearance, recorded_clearance};
 use needlebench_kinematics::Joints;
 use needlebench_planning::Planner;
+use needlebench_scenario::study::StudyMode;
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 use needlebench_study::{Outcome, Row};
 use tempfile::TempDir;
 

@@ -7,8 +7,8 @@ use nalgebra::{Point3, Vector3};
 use needlebench_bench::progress::Silent;
 use needlebench_bench::suggest::suggest_entries;
 use needlebench_bench::{Control, Preview};
-use needlebench_cell::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily};
 use needlebench_planning::judge_route;
+use needlebench_scenario::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily};
 
 use crate::directed::entering_by_direction;
 
