@@ -1,4 +1,4 @@
-//! Arguments that several commands have.
+//! Arguments shared by several commands.
 
 mod engine;
 mod pictures;
@@ -10,8 +10,8 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nalgebra::Matrix3x4;
-use needlebench_cell::MissingInertia;
 use needlebench_kinematics::UrModel;
+use needlebench_robot::MissingInertia;
 
 use crate::output::complain;
 
@@ -19,40 +19,40 @@ pub(crate) use engine::{EngineArgument, EngineParser};
 pub(crate) use pictures::PicturesArguments;
 pub(crate) use table::{TableArguments, leave};
 
-/// Another robot than the scenario's, and whose data it has.
+/// A robot in place of the scenario's, and its arm data.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct RobotArguments {
-    /// The arm whose data the robot has: a shipped one's name, such as ur5e, or an arm.toml; without
-    /// --robot it is the robot too.
+    /// Arm data: a bundled arm (e.g. ur5e) or the path of an arm.toml; also selects the robot unless --robot
+    /// is given.
     #[arg(long, value_name = "ARM")]
     pub arm: Option<String>,
     #[command(flatten)]
     pub urdf: UrdfArguments,
 }
 
-/// Another robot than the scenario's.
+/// A robot in place of the scenario's.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct UrdfArguments {
-    /// URDF of another UR arm, or a shipped arm's name, instead of the scenario's or the default one.
+    /// URDF of another UR arm, or a bundled arm's name [default: the scenario's robot, or a UR3].
     #[arg(long, value_name = "URDF")]
     pub robot: Option<PathBuf>,
-    /// What stands before the names of the arm's links and joints, such as left_ where a URDF has two arms; the others'
-    /// joints stand still at 0.
+    /// Prefix of the arm's link and joint names, e.g. left_ in a URDF with two arms; joints of the other arms are fixed
+    /// at 0.
     #[arg(long, value_name = "PREFIX")]
     pub prefix: Option<String>,
-    /// Folder of a ROS package that the URDF's meshes name; may be given several times.
+    /// Folder of a ROS package that the URDF's meshes refer to; repeatable.
     #[arg(long, value_name = "NAME=DIR")]
     pub package_path: Vec<String>,
-    /// Factory calibration of the arm, as ROS's `ur_calibration` writes it: its joint origins
-    /// replace the URDF's.
+    /// Factory calibration of the arm, as written by ROS's `ur_calibration`; its joint origins replace
+    /// the URDF's.
     #[arg(long, value_name = "YAML")]
     pub calibration: Option<PathBuf>,
-    /// What to do when a moving link has no mass.
+    /// Policy for moving links without mass.
     #[arg(long, value_name = "POLICY", value_parser = missing_inertia())]
     pub missing_inertia: Option<MissingInertia>,
 }
 
-/// Another robot than the default one, where its kinematics are enough.
+/// A robot in place of the default one, for commands that need its kinematics only.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct ArmArguments {
     /// A UR arm by name, with its nominal lengths: UR3, UR3e, UR5, UR5e, UR10, UR10e or UR16e.
@@ -66,7 +66,7 @@ pub(crate) struct ArmArguments {
     pub robot: UrdfArguments,
 }
 
-/// Refuse the robot, or take the mass properties of the arm that it is.
+/// Parser of the policies: reject the robot, or use the mass properties of the arm that it is.
 fn missing_inertia() -> impl TypedValueParser<Value = MissingInertia> {
     PossibleValuesParser::new(MissingInertia::texts()).map(|text| {
         text.parse()
@@ -89,7 +89,7 @@ impl std::str::FromStr for Six {
         let count = numbers.len();
         let numbers: [(f64, f64); 6] = numbers
             .try_into()
-            .map_err(|_| format!("needs six numbers separated by commas, got {count}"))?;
+            .map_err(|_| format!("expected six comma-separated numbers, got {count}"))?;
         Ok(Self(
             numbers.map(|(value, _)| value),
             numbers.map(|(_, half_unit)| half_unit),
@@ -98,7 +98,7 @@ impl std::str::FromStr for Six {
 }
 
 impl Six {
-    /// Doubts joint positions of more than two turns, which no arm has: they are likely degrees.
+    /// Warns of joint positions of more than two turns, which no arm has: they are likely degrees.
     pub(crate) fn doubt_degrees(&self) {
         if let Some(most) = self.0.iter().find(|q| q.abs() > 2.0 * TAU) {
             complain(&format!(
@@ -134,16 +134,16 @@ impl std::str::FromStr for PoseMatrix {
                 if last != [0.0, 0.0, 0.0, 1.0] {
                     let columns = [3, 7, 11].iter().all(|&at| rows[at] == 0.0) && last[3] == 1.0;
                     return Err(if columns {
-                        "the numbers are column by column; give them row by row".to_owned()
+                        "the numbers are in column-major order; give them row by row".to_owned()
                     } else {
-                        format!("the last row is {last:?}, but has to be 0, 0, 0, 1")
+                        format!("the last row is {last:?}, required are 0, 0, 0, 1")
                     });
                 }
                 rows
             }
             _ => {
                 return Err(format!(
-                    "needs 12 numbers (three rows of rotation and position) or 16, got {count}"
+                    "expected 12 numbers (three rows of rotation and position) or 16, got {count}"
                 ));
             }
         };

@@ -1,4 +1,4 @@
-//! The commands, and what each ends with.
+//! The commands and their exit status.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -23,17 +23,17 @@ use crate::failure::Failure;
 use crate::host::{Invocation, hosted};
 use crate::log::{LogLevel, told};
 use crate::output::{complain, keep_to_width, print_as_it_is};
+use crate::renamed::tell_former_names;
 
-/// Testbench for needle-guide robots: which of the eight arm configurations put the needle guide
-/// on its place, how far off the needle's tip is, and how close anything comes to anything.
+/// Simulation testbench for needle-guide robots: feasible arm configurations, needle-tip accuracy, clearances.
 #[derive(Debug, Parser)]
 #[command(name = "needlebench", version = PROGRAM_VERSION, propagate_version = true, max_term_width = 100)]
 #[command(
-    after_help = "Exit status: 0 all criteria met, 1 a criterion failed or was not judged, 2 bad input, \
-                        3 the environment or an engine failed, 130 interrupted."
+    after_help = "Exit status: 0 all criteria met, 1 a criterion failed or was not evaluated, 2 invalid input, \
+                        3 environment or engine failure, 130 interrupted."
 )]
 struct Cli {
-    /// Tell what was read, decided and skipped, on standard error.
+    /// Log what is read, decided and skipped to standard error.
     #[arg(long = "log", global = true, value_enum, value_name = "LEVEL")]
     log_level: Option<LogLevel>,
     #[command(subcommand)]
@@ -42,12 +42,12 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Write a first scenario: small, commented, and one that passes.
+    /// Write a small, commented first scenario that passes.
     #[command(
         after_help = "Example: needlebench init my_cell.toml --arm ur5e --lesion left_upper_lobe"
     )]
     Init(InitArguments),
-    /// Propose entries for a lesion, and places for the robot's base, as TOML to paste.
+    /// Propose entries for a lesion and base placements for the robot, as TOML to paste.
     #[command(
         after_help = "Example: needlebench suggest scenarios/supine_suite.toml --lesion left_upper_lobe --out out"
     )]
@@ -58,52 +58,54 @@ enum Command {
     /// Parse, resolve and validate scenarios without simulating.
     #[command(after_help = "Example: needlebench check scenarios/*.toml")]
     Check(CheckArguments),
-    /// All joint positions for a pose of the flange or a goal of a scenario.
+    /// Compute all inverse-kinematics solutions for a flange pose or a scenario goal.
     #[command(
         after_help = "Example: needlebench ik --pose 0.1942,-0.3593,0.1701,-0.8567,2.7197,-1.1407"
     )]
     Ik(Box<IkArguments>),
-    /// Pose of the flange and of every link for joint positions.
+    /// Compute the poses of the flange and of every link for joint positions.
     #[command(
         after_help = "Example: needlebench fk --joints -0.735,2.370,1.883,-1.967,1.274,0.114"
     )]
     Fk(FkArguments),
-    /// Signed clearance of one posture in a scenario's cell.
+    /// Compute the signed clearances of one posture in a scenario's cell.
     #[command(
         after_help = "Example: needlebench clearance scenarios/table3.toml --joints 0,-1.57,-1,-1.57,1.57,0"
     )]
     Clearance(ClearanceArguments),
-    /// Every configuration at every angle of the guide about the needle: what works, and why not.
+    /// Map feasibility of every configuration over the roll angle about the needle.
     #[command(
-        after_help = "Example: needlebench atlas scenarios/supine_suite.toml --goal right_upper_anterior"
+        name = "roll-map",
+        alias = "atlas",
+        after_help = "Example: needlebench roll-map scenarios/supine_suite.toml --goal right_upper_anterior"
     )]
     Atlas(AtlasArguments),
-    /// A scenario in the format of another tool: the whole cell for MuJoCo, for ROS, or as glTF; one of its motions for
-    /// ROS 2 or for a controller.
+    /// Export a scenario to another tool: the whole cell for MuJoCo, for ROS or as glTF; one of its motions for ROS 2
+    /// or for a controller.
     #[command(after_help = "Example: needlebench export scenarios/table3.toml --as mjcf")]
     Export(Box<ExportArguments>),
-    /// Two results side by side: what changed, and whether more was lost than is allowed.
+    /// Compare two results; fail on regressions beyond given thresholds.
     #[command(
         after_help = "Example: needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm",
         after_long_help = command::compare_help()
     )]
     Compare(Box<CompareArguments>),
-    /// CT volumes: what one is, and synthetic ones of phantoms.
+    /// Inspect, convert and synthesise CT volumes; plan needle paths.
     #[command(after_help = "Example: needlebench ct info scan.nii.gz")]
     Ct(CtArguments),
-    /// The planning page on a patient's CT, served on this machine: lesion, target, entry, and which configurations reach it.
+    /// Serve the planning page for a patient's CT on this machine: lesion, target, entry and feasible configurations.
     #[command(
         after_help = "Example: needlebench view out/patient",
         after_long_help = VIEW_HELP
     )]
     View(ViewArguments),
-    /// Many cases of one scenario: a table of results, statistics, and a page to look at them.
+    /// Compute many cases of one scenario; write a table of results, statistics and a report page.
     #[command(
         after_help = "Example: needlebench study scenarios/studies/layouts.toml",
         after_long_help = STUDY_HELP
     )]
     Study(Box<StudyArguments>),
-    /// The best of a study's choices, looked for instead of listed: where the base should stand, which tool.
+    /// Optimise a study's control factors, such as base placement or tool.
     #[command(
         after_help = "Example: needlebench search scenarios/studies/search_base.toml",
         after_long_help = SEARCH_HELP
@@ -114,31 +116,33 @@ enum Command {
         after_help = "Example: needlebench merge scenarios/studies/layouts.toml shard1/layouts shard2/layouts"
     )]
     Merge(MergeArguments),
-    /// Accuracy and repeatability of a real robot by ISO 9283, from a laser tracker's log.
+    /// Evaluate accuracy and repeatability of a real robot by ISO 9283 from a laser tracker's log.
     #[command(
         after_help = "Example: needlebench iso9283 --csv robot.csv --commanded commanded.csv --max-rp 0.1",
         after_long_help = ISO9283_HELP
     )]
     Iso9283(Iso9283Arguments),
-    /// A safe run that excites every joint, for a log from which an arm is calibrated and identified: as a
-    /// scenario and as URScript, with its proven clearances.
+    /// Plan a collision-free excitation run for calibration and dynamic identification; write it as scenario and
+    /// URScript.
     #[command(
-        after_help = "Example: needlebench record-plan --arm ur3e --payload-kg 0,1 --out out"
+        name = "plan-excitation",
+        alias = "record-plan",
+        after_help = "Example: needlebench plan-excitation --arm ur3e --payload-kg 0,1 --out out"
     )]
     RecordPlan(Box<RecordPlanArguments>),
-    /// A recorded run of a real arm: what it says of the arm, and the same set-points in the engines.
+    /// Identify the parameters of a real arm from a log and replay its set-points in the engines.
     #[command(
         after_help = "Example: needlebench replay models/ur3e/recorded/ur3e_rad_20211005.csv",
         after_long_help = REPLAY_HELP
     )]
     Replay(Box<ReplayArguments>),
-    /// Every pair of bodies: measured or left out, why, and the evidence; and checks an SRDF.
+    /// List collision pairs, enabled or disabled, with reasons; check an SRDF.
     #[command(after_help = "Example: needlebench pairs scenarios/table3.toml --srdf arm.srdf")]
     Pairs(PairsArguments),
-    /// The joint servo's data sheet: settings with sources, closed loop, step and sine responses.
+    /// Measure the joint servo; write its data sheet: settings with sources, closed loop, step and sine responses.
     #[command(after_help = "Example: needlebench servo scenarios/table3.toml --joint wrist_1")]
     Servo(ServoArguments),
-    /// Evidence for the credibility of results, in the frame of ASME V&V 40.
+    /// Collect evidence for the credibility of results, in the framework of ASME V&V 40.
     #[command(
         after_help = "Example: needlebench report out/table3 --credibility",
         after_long_help = REPORT_HELP
@@ -147,32 +151,32 @@ enum Command {
     /// Reproduce the paper: Table 3, every equation, both methods, and Figure 6.
     #[command(after_help = "Example: needlebench paper --out out/paper")]
     Paper(PaperArguments),
-    /// JSON schema of scenario, study or arm files, for editors; the table of metrics.
+    /// Print the JSON schema of scenario, study or arm files, for editors, or the table of metrics.
     #[command(after_help = "Example: needlebench schema scenario > scenario.schema.json")]
     Schema {
-        /// What to describe.
+        /// Format to describe.
         #[arg(value_enum)]
         format: SchemaFormat,
-        /// Print it as Markdown, for people.
+        /// Print Markdown instead of JSON.
         #[arg(long)]
         markdown: bool,
     },
-    /// What this machine has and lacks for running both engines; sets MuJoCo up ahead, with and without a network.
+    /// Check the environment; pre-install MuJoCo, online or offline.
     #[command(
         after_help = "Example: needlebench doctor --prepare",
         after_long_help = DOCTOR_HELP
     )]
     Doctor(DoctorArguments),
-    /// Licences of everything of others that is inside the program.
+    /// Print third-party licences.
     #[command(
         alias = "licenses",
         after_help = "Example: needlebench licences | less"
     )]
     Licences,
-    /// Completions for a shell.
+    /// Print completions for a shell.
     #[command(after_help = "Example: needlebench completions bash > needlebench.bash")]
     Completions {
-        /// The shell.
+        /// Shell.
         #[arg(value_enum)]
         shell: clap_complete::Shell,
     },
@@ -188,9 +192,10 @@ pub fn main() -> ExitCode {
     main_with(std::env::args_os().collect()).into()
 }
 
-/// The same with arguments from elsewhere, the program's name first.
+/// Runs the program with these arguments, the program's name first.
 pub fn main_with(arguments: Vec<OsString>) -> ExitStatus {
     caught(|| {
+        tell_former_names(&arguments);
         let cli = Cli::parse_from(arguments);
         run(cli)
     })
@@ -199,34 +204,38 @@ pub fn main_with(arguments: Vec<OsString>) -> ExitStatus {
 /// Runs a command as part of another program, on this thread. The arguments begin with the command; nothing is printed, and
 /// signals and the process are left alone.
 ///
-/// Setting `cancel` is an interrupt. A panic is a bug, and is told as one.
+/// Setting `cancel` is an interrupt. A panic is a bug, and is reported as one.
 pub fn invoke(
     arguments: Vec<OsString>,
     cancel: Arc<AtomicBool>,
     progress: Arc<dyn Progress + Send + Sync>,
 ) -> Invocation {
     let program = std::iter::once(OsString::from("needlebench"));
+    let arguments: Vec<OsString> = program.chain(arguments).collect();
     hosted(cancel, progress, || {
-        caught(|| match Cli::try_parse_from(program.chain(arguments)) {
-            Ok(cli) => run(cli),
-            Err(error) => {
-                let text = error.render().to_string();
-                if error.use_stderr() {
-                    complain(text.trim_end());
-                    return ExitStatus::BadInput;
+        caught(|| {
+            tell_former_names(&arguments);
+            match Cli::try_parse_from(arguments) {
+                Ok(cli) => run(cli),
+                Err(error) => {
+                    let text = error.render().to_string();
+                    if error.use_stderr() {
+                        complain(text.trim_end());
+                        return ExitStatus::BadInput;
+                    }
+                    // Only the host reads it.
+                    let _ = print_as_it_is(text.trim_end());
+                    ExitStatus::Success
                 }
-                // Nobody but the host reads it.
-                let _ = print_as_it_is(text.trim_end());
-                ExitStatus::Success
             }
         })
     })
 }
 
-/// What is wrong is on standard error by then; a bug of ours has a status as everything else.
+/// Turns a panic into an exit status; its message is on standard error by then.
 fn caught(run: impl FnOnce() -> ExitStatus) -> ExitStatus {
     std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_or_else(|_| {
-        complain("error: this is a bug of needlebench, not of your input");
+        complain("error: this is a bug in needlebench, not in your input");
         ExitStatus::EnvironmentFailed
     })
 }

@@ -7,7 +7,7 @@ thread_local! {
     static STARTED: Cell<Option<Instant>> = const { Cell::new(None) };
 }
 
-/// The command of this thread begins now.
+/// Starts the clock of the command of this thread.
 pub(crate) fn start() {
     STARTED.set(Some(Instant::now()));
 }

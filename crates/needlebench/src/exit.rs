@@ -4,14 +4,14 @@ use std::process::ExitCode;
 
 use needlebench_evaluation::report::Verdict;
 
-/// What a run's exit status says.
+/// Exit status of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ExitStatus {
-    /// All criteria were met.
+    /// All criteria are met.
     Success,
-    /// A criterion was not met, or could not be judged.
+    /// A criterion failed, or was not evaluated.
     CriterionFailed,
-    /// The input is wrong.
+    /// The input is invalid.
     BadInput,
     /// The environment or an engine failed.
     EnvironmentFailed,
@@ -20,7 +20,7 @@ pub enum ExitStatus {
 }
 
 impl ExitStatus {
-    /// Of what was judged: only what is complete and met succeeds.
+    /// The exit status of a verdict: only a complete result that meets all criteria succeeds.
     pub fn of(verdict: Verdict) -> Self {
         match verdict {
             Verdict::Pass => Self::Success,

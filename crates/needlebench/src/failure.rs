@@ -1,25 +1,25 @@
-//! Why a command has no answer.
+//! Failures of commands.
 
 use needlebench_bench::Stop;
-use needlebench_cell::Finding;
+use needlebench_input::{Finding, nothing_serves};
 use needlebench_study::StudyError;
 
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::output::complain;
 
-/// Why a command ends without an answer: what standard error says, and the exit status.
+/// Why a command ends without an answer: the text on standard error, and the exit status.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// The input is wrong.
+    /// The input is invalid.
     BadInput(Vec<Finding>),
-    /// The input is sound, and what it asks for is not met.
+    /// The input is valid, but infeasible.
     Missed(Vec<Finding>),
-    /// It ended with this status, as the message says.
+    /// It ended with this status and message.
     Ended {
-        /// What the program ends with.
+        /// Exit status of the program.
         status: ExitStatus,
-        /// What there is to say.
+        /// Message on standard error.
         message: String,
     },
     /// The environment failed.
@@ -27,7 +27,7 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// It was interrupted; the message says what became of the results.
+    /// It was interrupted; the message states which results exist.
     pub(crate) fn interrupted(message: impl Into<String>) -> Self {
         Self::Ended {
             status: ExitStatus::Interrupted,
@@ -39,11 +39,11 @@ impl Failure {
     pub(crate) fn of_stop(stop: Stop, interrupted: &str) -> Self {
         match stop {
             Stop::Interrupted => Self::interrupted(interrupted),
-            Stop::Refused(findings) => Self::BadInput(findings),
+            Stop::Refused(findings) => findings.into(),
         }
     }
 
-    /// Tells it, and gives the exit status.
+    /// Prints it, and returns the exit status.
     pub(crate) fn tell(self) -> ExitStatus {
         match self {
             Self::BadInput(findings) => {
@@ -75,13 +75,17 @@ impl Failure {
 
 impl From<Finding> for Failure {
     fn from(finding: Finding) -> Self {
-        Self::BadInput(vec![finding])
+        vec![finding].into()
     }
 }
 
 impl From<Vec<Finding>> for Failure {
     fn from(findings: Vec<Finding>) -> Self {
-        Self::BadInput(findings)
+        if nothing_serves(&findings) {
+            Self::Missed(findings)
+        } else {
+            Self::BadInput(findings)
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use std::path::Path;
 
-use needlebench_cell::{Finding, printable, printable_line, read_text};
+use needlebench_input::{Finding, printable, printable_line, read_text};
 
 use crate::host::take_findings;
 use crate::output::complain_styled;
@@ -16,7 +16,7 @@ pub(crate) fn print_findings(findings: &[Finding]) {
     }
 }
 
-/// Findings as the command line tells them, without colours.
+/// Findings as printed by the command line, without colours.
 pub fn findings_text(findings: &[Finding]) -> String {
     let each = findings
         .iter()
@@ -25,7 +25,7 @@ pub fn findings_text(findings: &[Finding]) -> String {
 }
 
 fn rendered(finding: &Finding) -> String {
-    // Shipped models have no file on disk to quote.
+    // Bundled models have no file on disk to quote.
     let text = read_text(Path::new(&finding.file)).unwrap_or_default();
     let finding = &Finding {
         file: printable_line(&finding.file),
@@ -43,7 +43,7 @@ fn rendered(finding: &Finding) -> String {
         }
         _ => finding.message.clone(),
     };
-    // A place in a text that is shown otherwise than it is written would be another one.
+    // A position would be wrong in a text that is printed with escapes.
     let text = if printable(&text) == text {
         text
     } else {

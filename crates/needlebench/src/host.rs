@@ -1,5 +1,5 @@
-//! Commands inside another program, such as Python: what they would print is handed over, and who interrupts them and
-//! watches them is that program's affair.
+//! Commands inside another program, such as Python: their output is returned, and that program handles interrupts and
+//! progress.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -7,20 +7,20 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use needlebench_bench::progress::Progress;
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 
 use crate::exit::ExitStatus;
 
-/// What a command left.
+/// The result of a command.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Invocation {
-    /// What it ended with.
+    /// Its exit status.
     pub status: ExitStatus,
-    /// What would have stood on standard output.
+    /// The text for standard output.
     pub output: String,
-    /// What would have stood on standard error, without colours and progress.
+    /// The text for standard error, without colours and progress.
     pub messages: String,
-    /// What was wrong with its input.
+    /// Errors in its input.
     pub findings: Vec<Finding>,
 }
 
@@ -56,7 +56,7 @@ pub(crate) fn hosted(
         said: Mutex::default(),
     });
     let before = HOST.replace(Some(Arc::clone(&host)));
-    let status = needlebench_report::layout::for_file(run);
+    let status = needlebench_show::layout::for_file(run);
     HOST.set(before);
     let said = std::mem::take(&mut *host.said());
     Invocation {
@@ -79,7 +79,7 @@ impl fmt::Debug for Host {
     }
 }
 
-/// Hands over to the host of this thread, if it has one.
+/// Calls a function with the host of this thread, if there is one.
 fn with<T>(ask: impl FnOnce(&Host) -> T) -> Option<T> {
     HOST.with_borrow(|host| host.as_deref().map(ask))
 }
@@ -89,17 +89,17 @@ pub(crate) fn is_hosted() -> bool {
     with(|_| ()).is_some()
 }
 
-/// Takes a line of output; `false` if it is to be printed.
+/// Stores a line of output; `false` if it must be printed.
 pub(crate) fn take_output(text: &str) -> bool {
     with(|host| push_line(&mut host.said().output, text)).is_some()
 }
 
-/// Takes a line of standard error; `false` if it is to be printed.
+/// Stores a line of standard error; `false` if it must be printed.
 pub(crate) fn take_message(text: &str) -> bool {
     with(|host| push_line(&mut host.said().messages, text)).is_some()
 }
 
-/// Takes findings, besides the lines that tell them.
+/// Stores findings, in addition to their printed lines.
 pub(crate) fn take_findings(findings: &[Finding]) {
     let _ = with(|host| host.said().findings.extend_from_slice(findings));
 }
@@ -109,7 +109,7 @@ pub(crate) fn cancel() -> Option<Arc<AtomicBool>> {
     with(|host| Arc::clone(&host.cancel))
 }
 
-/// Who watches.
+/// The progress of the host.
 pub(crate) fn progress() -> Option<Arc<dyn Progress + Send + Sync>> {
     with(|host| Arc::clone(&host.progress))
 }

@@ -1,4 +1,4 @@
-//! Interrupts, and threads that were asked for.
+//! Interrupts, and the number of threads.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 
 use crate::host;
 
-/// Set when the user interrupts the program, or the program that has this one inside interrupts it.
+/// A flag that is set when the user or the host program interrupts.
 pub(crate) fn watch_interrupts() -> Result<Arc<AtomicBool>> {
     if let Some(cancel) = host::cancel() {
         return Ok(cancel);
@@ -15,11 +15,11 @@ pub(crate) fn watch_interrupts() -> Result<Arc<AtomicBool>> {
     let cancel = Arc::new(AtomicBool::new(false));
     let requested = Arc::clone(&cancel);
     ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
-        .context("cannot watch for interrupts")?;
+        .context("cannot install the interrupt handler")?;
     Ok(cancel)
 }
 
-/// Threads: those that were asked for, or as many as the machine has cores.
+/// Number of threads: as requested, or the number of cores.
 pub(crate) fn threads(jobs: Option<u16>) -> usize {
     jobs.map_or_else(
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),

@@ -1,4 +1,4 @@
-//! The command line of the testbench, for a terminal and for programs that have it inside ([`invoke`]).
+//! The command line of the testbench, for a terminal and for embedding in other programs ([`invoke`]).
 //!
 //! Data goes to standard output, logs and progress to standard error.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
@@ -15,6 +15,7 @@ mod interrupts;
 mod log;
 mod output;
 mod progress;
+mod renamed;
 
 pub use cli::{command_line, invoke, main, main_with};
 pub use command::KinematicArm;

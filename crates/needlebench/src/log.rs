@@ -1,7 +1,7 @@
-//! `--log LEVEL`: what was read, decided and skipped, stage by stage, on standard error.
+//! `--log LEVEL`: logs what is read, decided and skipped, stage by stage, to standard error.
 //!
-//! Libraries tell it by `tracing`; only here is somebody who listens. Nothing of it gets into results. Lines have the
-//! seconds since the start, so that they are no results either.
+//! Libraries emit `tracing` events; only this module subscribes. Log lines are not part of results; they start with the
+//! seconds since the start.
 
 use std::io;
 
@@ -12,18 +12,18 @@ use tracing_subscriber::fmt::time::uptime;
 use crate::host;
 use crate::output::complain;
 
-/// How much is told. (Documented variants would make the help of every command a long one.)
+/// Log levels. (Documented variants would lengthen the help of every command.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum LogLevel {
-    // What makes results incomplete.
+    // Events that make results incomplete.
     Error,
-    // What could not be done.
+    // Failed steps.
     Warn,
-    // Stages, and what was decided.
+    // Stages and decisions.
     Info,
     // Files read and written, notes.
     Debug,
-    // All of it.
+    // Everything.
     Trace,
 }
 
@@ -39,7 +39,7 @@ impl From<LogLevel> for Level {
     }
 }
 
-/// Listens while the command runs: of another program's, on this thread alone.
+/// Subscribes while the command runs; inside another program, on this thread only.
 pub(crate) fn told<T>(level: Option<LogLevel>, run: impl FnOnce() -> T) -> T {
     let Some(level) = level else {
         return run();
@@ -52,14 +52,14 @@ pub(crate) fn told<T>(level: Option<LogLevel>, run: impl FnOnce() -> T) -> T {
         .with_writer(|| Lines)
         .finish();
     if !host::is_hosted() {
-        // Whoever set one before, such as a test in this process, listens on.
+        // A subscriber set before, such as by a test in this process, remains.
         let _ = tracing::subscriber::set_global_default(subscriber);
         return run();
     }
     tracing::subscriber::with_default(subscriber, run)
 }
 
-/// Whether somebody listens: lines and a bar do not share a terminal.
+/// Whether a subscriber is active: log lines and a progress bar do not share a terminal.
 pub(crate) fn is_told() -> bool {
     tracing::enabled!(Level::ERROR)
 }

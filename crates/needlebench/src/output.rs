@@ -1,20 +1,20 @@
 //! Standard output and standard error.
 //!
-//! What cannot be written is lost, never a panic: a reader that has gone is its own choice, and a full
-//! standard error has nobody to tell.
+//! A failed write never panics: a closed pipe is the reader's choice, and a failure of standard error cannot be
+//! reported.
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use needlebench_cell::{printable, printable_line};
-use needlebench_report::layout;
+use needlebench_input::{printable, printable_line};
+use needlebench_show::layout;
 
 use crate::host;
 
-/// Tells tables and sentences how wide they may be: `COLUMNS`, else the terminal's width, else that of a log.
+/// Sets the width of tables and sentences: `COLUMNS`, else the width of the terminal, else that of a log.
 pub(crate) fn keep_to_width() {
-    // Nobody looks, or it is not ours.
+    // The terminal belongs to the host.
     if host::is_hosted() {
         return;
     }
@@ -24,21 +24,21 @@ pub(crate) fn keep_to_width() {
     layout::set_width(Some(width.unwrap_or(layout::DEFAULT_WIDTH)));
 }
 
-/// The width that `COLUMNS` asks for.
+/// The width in `COLUMNS`.
 fn columns() -> Option<usize> {
     let asked = std::env::var("COLUMNS").ok()?;
     asked.trim().parse().ok().filter(|width| *width > 0)
 }
 
-/// Breaks nothing from now on: tables are as wide as they are.
+/// Disables line breaks: tables have their full width.
 pub(crate) fn print_wide() {
     if !host::is_hosted() {
         layout::set_width(None);
     }
 }
 
-/// Writes text for people and a line end to standard output; on a terminal, and where `COLUMNS` says how wide it
-/// may be, lines are broken at spaces.
+/// Writes text for people and a line end to standard output; on a terminal, or with `COLUMNS`, lines are broken at
+/// spaces.
 pub(crate) fn print_text(text: &str) -> Result<()> {
     if !host::is_hosted() && (std::io::stdout().is_terminal() || columns().is_some()) {
         print_as_it_is(&layout::wrapped(text))
@@ -49,7 +49,7 @@ pub(crate) fn print_text(text: &str) -> Result<()> {
 
 /// Writes text for programs and a line end to standard output.
 ///
-/// A reader that stops reading is no error: what the command found decides its exit status.
+/// A closed pipe is not an error: the answer of the command determines its exit status.
 pub(crate) fn print_as_it_is(text: &str) -> Result<()> {
     let text = without_commands(text);
     if host::take_output(&text) {
@@ -67,13 +67,13 @@ pub(crate) fn complain(text: &str) {
     complain_styled(&printable(text));
 }
 
-/// The same of a text with colours of ours.
+/// The same for a text with colours of this program.
 pub(crate) fn complain_styled(text: &str) {
     if host::take_message(text) {
         return;
     }
     let mut error = anstream::stderr().lock();
-    // There is nobody left to tell.
+    // A failure cannot be reported.
     let _ = writeln!(error, "{text}").and_then(|()| error.flush());
 }
 
@@ -82,7 +82,7 @@ pub(crate) fn shown(path: &Path) -> String {
     printable_line(&path.display().to_string())
 }
 
-/// A text with the colours that our tables have, and no other control characters.
+/// A text with the colours of tables, and no other control characters.
 fn without_commands(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     let mut rest = text;

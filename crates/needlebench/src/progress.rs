@@ -11,7 +11,7 @@ use crate::host;
 use crate::log;
 use crate::output::complain;
 
-/// Environment variable that switches it off, for whole jobs.
+/// Environment variable that disables progress, for whole jobs.
 const SWITCH: &str = "NEEDLEBENCH_PROGRESS";
 
 /// Progress on standard error.
@@ -20,9 +20,9 @@ pub(crate) enum TerminalProgress {
     Bar(ProgressBar),
     /// Lines, in a log.
     Log(Mutex<Log>),
-    /// Told to the program that has this one inside.
+    /// Forwarded to the host program.
     Told(Arc<dyn Progress + Send + Sync>),
-    /// Nothing at all.
+    /// No progress.
     Hidden,
 }
 
@@ -38,7 +38,7 @@ impl fmt::Debug for TerminalProgress {
 }
 
 impl TerminalProgress {
-    /// `quiet` hides it everywhere, as `NEEDLEBENCH_PROGRESS=off` does.
+    /// `quiet` disables it, as does `NEEDLEBENCH_PROGRESS=off`.
     pub(crate) fn new(quiet: bool) -> Self {
         if let Some(progress) = host::progress() {
             return Self::Told(progress);
@@ -67,7 +67,7 @@ impl TerminalProgress {
         }
     }
 
-    /// Changes what the log knows, and writes its line if one is due.
+    /// Changes the state of the log, and writes a line if one is due.
     fn log(&self, change: impl FnOnce(&mut Log)) {
         if let Self::Log(log) = self {
             let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
@@ -131,7 +131,7 @@ impl Progress for TerminalProgress {
     }
 }
 
-/// What is logged, and when the last line was.
+/// State of the log, and the time of its last line.
 #[derive(Debug)]
 pub(crate) struct Log {
     started: Instant,
@@ -141,9 +141,9 @@ pub(crate) struct Log {
     total: u64,
 }
 
-/// Least time between two lines; what takes less has none.
+/// Least time between two lines; shorter work has none.
 const LEAST: Duration = Duration::from_secs(1);
-/// Lines of long work are rarer: this share of the time that it took so far.
+/// Least time between two lines of long work, as a share of its elapsed time.
 const SHARE: f64 = 0.05;
 
 impl Log {

@@ -5,11 +5,11 @@ use std::ffi::OsStr;
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command, Error};
-use needlebench_cell::nearest_name;
-use needlebench_cell::scenario::EngineName;
 use needlebench_engine::{ENGINES, choose_engines, engine_names};
+use needlebench_input::nearest_name;
+use needlebench_scenario::scenario::EngineName;
 
-/// All engines that run where nobody names any.
+/// All engines that run by default.
 const BOTH: &str = "both";
 
 /// Names of engines: one, several between commas, or `both`.
@@ -23,7 +23,7 @@ impl EngineArgument {
     }
 }
 
-/// Reads names of engines that there are.
+/// Parses names of existing engines.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct EngineParser;
 

@@ -1,36 +1,35 @@
-//! Whether pictures are drawn.
+//! Whether images are rendered.
 
 use clap::Args;
 
 use crate::output::complain;
 
-/// Pictures are most of the time and of the size of results, and nobody looks at them in continuous
-/// integration.
+/// Images take most of the time and of the size of results, and continuous integration rarely uses them.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub(crate) struct PicturesArguments {
-    /// Draw pictures although the environment variable CI is set, which leaves them out.
+    /// Render images even if the environment variable CI is set.
     #[arg(long)]
     pub pictures: bool,
-    /// Draw no pictures.
+    /// Do not render images.
     #[arg(long, conflicts_with = "pictures")]
     pub no_pictures: bool,
 }
 
 impl PicturesArguments {
-    /// Whether to draw; says so where nobody asked for none and none are drawn.
+    /// Whether to render images; prints a note if CI alone disables them.
     pub fn are_wanted(self, quiet: bool) -> bool {
         if self.pictures || self.no_pictures {
             return self.pictures;
         }
         let is_left_out = is_ci(std::env::var("CI").ok().as_deref());
         if is_left_out && !quiet {
-            complain("no pictures, because CI is set; --pictures draws them");
+            complain("images disabled because CI is set; --pictures enables them");
         }
         !is_left_out
     }
 }
 
-/// Whether a value of the variable `CI` says that this is continuous integration.
+/// Whether a value of the variable `CI` means continuous integration.
 fn is_ci(value: Option<&str>) -> bool {
     let value = value.unwrap_or_default().trim().to_ascii_lowercase();
     !["", "0", "false"].contains(&value.as_str())

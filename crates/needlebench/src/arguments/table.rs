@@ -1,4 +1,4 @@
-//! Tables that are made on request.
+//! Tables that are written on request.
 
 use std::path::Path;
 
@@ -14,18 +14,17 @@ use crate::output::{print_text, shown};
 /// Which table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TableKind {
-    /// Errors at entry and target as needle papers print them, with published figures.
+    /// Errors at entry and target as reported in the needle literature, with published values.
     Accuracy,
 }
 
-/// The table that papers print.
+/// The table of errors as reported in the literature.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct TableArguments {
-    /// Print a table, and write it as accuracy.md, accuracy.csv and accuracy.tex.
+    /// Print a table and write it as accuracy.md, accuracy.csv and accuracy.tex.
     #[arg(long, value_name = "TABLE", value_enum)]
     pub table: Option<TableKind>,
-    /// With --table: what its rows are of; goals if left out. A run has goal and configuration, a study its
-    /// factors too.
+    /// With --table: what defines its rows [default: goal]: goal and configuration, and for a study its factors.
     #[arg(
         long,
         value_name = "FACTOR[,FACTOR]",
@@ -33,18 +32,18 @@ pub(crate) struct TableArguments {
         requires = "table"
     )]
     pub by: Vec<String>,
-    /// With --table: which needles. best, of each case of a study or goal of a run that of the best
-    /// configuration; every; or a configuration's label. If left out best of studies, every of runs.
+    /// With --table: configurations to include: `best` per case or goal, `every`, or a label [default: best for
+    /// studies, every for runs].
     #[arg(long, value_name = "NEEDLES", requires = "table")]
     pub of: Option<Needles>,
-    /// With --table: radius about the target within which a needle counts as a hit; the limit of the
-    /// criteria if left out.
+    /// With --table: radius about the target within which a needle counts as a hit [default: the limit in the
+    /// criteria].
     #[arg(long, value_name = "MM", requires = "table", value_parser = radius)]
     pub hit_radius: Option<f64>,
 }
 
 impl TableArguments {
-    /// The table that is asked for.
+    /// The requested table.
     pub fn request(&self) -> Option<AccuracyRequest> {
         let TableKind::Accuracy = self.table?;
         Some(AccuracyRequest {
@@ -72,6 +71,6 @@ pub(crate) fn leave(table: &AccuracyTable, folder: &Path, is_printed: bool) -> R
 fn radius(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(radius) if f64::is_finite(radius) && radius > 0.0 => Ok(radius),
-        _ => Err("it is a length in mm above 0, such as 2.5".to_owned()),
+        _ => Err("expected a length in mm above 0, such as 2.5".to_owned()),
     }
 }

@@ -1,13 +1,14 @@
-//! `needlebench atlas`.
+//! `needlebench roll-map`.
 
 use crate::arguments::{PicturesArguments, RobotArguments};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
 use anyhow::Result;
-use needlebench_cell::{Finding, Goal, ResolvedScenario, nearest_name};
 use needlebench_clearance::ClearanceModel;
+use needlebench_input::{Finding, nearest_name};
 use needlebench_planning::Aim;
+use needlebench_scenario::{Goal, ResolvedScenario};
 
 use super::results_folder::ResultsFolder;
 use super::{load, overrides, print_json, print_text};
@@ -21,57 +22,57 @@ use needlebench_report::table::atlas::text;
 
 #[derive(Debug, Args)]
 pub(crate) struct AtlasArguments {
-    /// Scenario whose goals are looked at.
+    /// Scenario whose goals are mapped.
     #[arg(value_name = "SCENARIO")]
     pub scenario: PathBuf,
-    /// One goal; all of them if left out.
+    /// Goal to map [default: all goals].
     #[arg(long, value_name = "NAME")]
     pub goal: Option<String>,
-    /// Rolls all round.
+    /// Number of roll angles over 360 deg.
     #[arg(long, value_name = "N", default_value_t = 360, value_parser = clap::value_parser!(u32).range(3..=36_000))]
     pub rolls: u32,
-    /// What the marked roll of each range is best at; the scenario's `planning.roll_aim` if left out.
-    /// The report has all aims.
+    /// Criterion of the marked roll of each range [default: the scenario's `planning.roll_aim`]; the report has all of
+    /// them.
     #[arg(long, value_enum)]
     pub aim: Option<AimArgument>,
-    /// Folder for results; the scenario gets a folder of its name in it.
+    /// Folder for results; the scenario has a subfolder of its name.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
-    /// Print all columns, as wide as they are, and what works nowhere among the rows.
+    /// Print all columns at full width, with configurations that are infeasible at every roll among the rows.
     #[arg(long, conflicts_with = "json")]
     pub wide: bool,
-    /// Print the atlas as one JSON document instead of the table.
+    /// Print the roll map as one JSON document instead of the table.
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
     pub pictures: PicturesArguments,
-    /// Write no page.
+    /// Do not write the page.
     #[arg(long)]
     pub no_page: bool,
-    /// Threads; the number of cores if left out. Results do not depend on it.
+    /// Number of threads [default: all cores]; does not affect results.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: Option<u16>,
     #[command(flatten)]
     pub robot: RobotArguments,
 }
 
-/// What a roll is best at.
+/// What a roll angle is optimised for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "snake_case")]
 pub(crate) enum AimArgument {
-    /// Soft least clearance over all classes.
+    /// Soft minimum of the clearances of all classes.
     Clearance,
     /// Margin to the joint limits.
     JointMargin,
     /// Distance from singularities.
     Singularity,
-    /// Least motion of the needle's tip under errors of the joints.
+    /// Least sensitivity of the needle tip to joint errors.
     TipAccuracy,
     /// Weighted mean of the utilities of all these.
     Balanced,
 }
 
-/// Computes and writes the atlas of one or all goals.
+/// Computes and writes the roll map of one or all goals.
 pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus, Failure> {
     if arguments.wide {
         print_wide();
@@ -91,8 +92,9 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus, Failure> {
     let model = ClearanceModel::new(&resolved.cell);
     let mut atlases: Vec<(&Goal, GoalAtlas)> = Vec::new();
     for goal in goals {
-        let atlas = goal_atlas(&resolved, &model, goal, arguments.rolls, aim, threads)
-            .map_err(|error| Finding::new(&resolved.cell.robot.source.file, error.to_string()))?;
+        let atlas = goal_atlas(&resolved, &model, goal, arguments.rolls, aim, threads).map_err(
+            |error| Finding::new(&resolved.robot_description.source.file, error.to_string()),
+        )?;
         atlases.push((goal, atlas));
     }
     let reports = atlases
@@ -122,7 +124,7 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus, Failure> {
             shown(&folder)
         ))?;
     }
-    // As `run`: a goal that no configuration can serve is a failure.
+    // As `run`: a goal for which no configuration is feasible is a failure.
     let all_work = atlases.iter().all(|(_, atlas)| atlas.works());
     Ok(if all_work {
         ExitStatus::Success
@@ -137,10 +139,10 @@ pub(super) fn goals<'r>(
     name: Option<&str>,
 ) -> Result<Vec<&'r Goal>, Finding> {
     if resolved.goals.is_empty() {
-        let finding = Finding::new(&resolved.source.file, "it has no goals to look at");
+        let finding = Finding::new(&resolved.source.file, "the scenario has no goals");
         return Err(finding
             .key("goals")
-            .hint("a scenario with [iso9283] is for `run`"));
+            .hint("use `run` for a scenario with [iso9283]"));
     }
     let Some(name) = name else {
         return Ok(resolved.goals.iter().collect());
@@ -154,7 +156,10 @@ pub(super) fn goals<'r>(
         return Ok(found);
     }
     let names: Vec<&str> = resolved.goals.iter().map(|goal| &*goal.name).collect();
-    let finding = Finding::new(&resolved.source.file, format!("it has no goal `{name}`"));
+    let finding = Finding::new(
+        &resolved.source.file,
+        format!("the scenario has no goal `{name}`"),
+    );
     Err(
         finding.hint(match nearest_name(name, names.iter().copied()) {
             Some(near) => format!("did you mean `{near}`? Goals: {}", names.join(", ")),

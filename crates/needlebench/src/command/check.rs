@@ -6,8 +6,10 @@ use anyhow::Result;
 use clap::Args;
 use needlebench_bench::Preview;
 use needlebench_bench::preview::BASIS;
-use needlebench_cell::{Finding, ResolvedScenario, part_in_words, reason_in_words};
+use needlebench_cell::{part_in_words, reason_in_words};
+use needlebench_input::{Finding, nothing_serves};
 use needlebench_report::table::{fissures_in_words, rejected_in_words, route_in_words};
+use needlebench_scenario::ResolvedScenario;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -36,7 +38,7 @@ struct CheckAnswer {
     ok: bool,
     findings: Vec<Finding>,
     notes: Vec<String>,
-    /// Of each file that can be read, in order.
+    /// One for each file that can be read, in order.
     scenarios: Vec<CheckedScenario>,
 }
 
@@ -48,10 +50,10 @@ struct CheckedScenario {
     preview: Preview,
 }
 
-/// Parses, resolves and validates scenarios, and says what can be known of them without a simulation.
+/// Parses, resolves and validates scenarios, and prints what follows from them without a simulation.
 pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus, Failure> {
     let mut findings = Vec::new();
-    // What is wrong in a file, other than what the cell in it cannot do.
+    // A file is invalid, as opposed to valid with infeasible goals.
     let mut bad_input = false;
     let mut notes = Vec::new();
     let mut scenarios = Vec::new();
@@ -65,7 +67,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus, Failure> {
                 let resolved = match load(path, &overrides) {
                     Ok(resolved) => resolved,
                     Err(found) => {
-                        bad_input = true;
+                        bad_input |= !nothing_serves(&found);
                         findings.extend(found.into_iter().map(|finding| placed(path, finding)));
                         continue;
                     }
@@ -108,18 +110,24 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus, Failure> {
     })
 }
 
-/// With its line, where it is about a key of the scenario's file.
+/// The finding with its line, if it is about a key of the scenario's file.
 fn placed(path: &Path, finding: Finding) -> Finding {
     if finding.line.is_some() || finding.file != path.display().to_string() {
         return finding;
     }
-    match needlebench_cell::read_text(path) {
+    match needlebench_input::read_text(path) {
         Ok(text) => finding.placed_in(&text),
         Err(_) => finding,
     }
 }
 
-/// What is known of a scenario, for people.
+/// A number with its noun: `1 goal`, `2 goals`.
+fn counted(count: usize, noun: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {noun}{plural}")
+}
+
+/// The summary of a scenario.
 fn in_words(
     path: &Path,
     resolved: &ResolvedScenario,
@@ -130,15 +138,15 @@ fn in_words(
     let purpose = match (&resolved.iso9283, &resolved.excitation) {
         (Some(_), _) => "test by ISO 9283".to_owned(),
         (None, Some(run)) => format!(
-            "excitation run, {} postures, {} payloads",
-            run.postures.len(),
-            run.loads.len()
+            "excitation run, {}, {}",
+            counted(run.postures.len(), "posture"),
+            counted(run.loads.len(), "payload")
         ),
-        (None, None) => format!("{} goals", resolved.goals.len()),
+        (None, None) => counted(resolved.goals.len(), "goal"),
     };
     write!(
         text,
-        "{}: {} ({purpose}, {} bodies, {} pairs)",
+        "{}: {} ({purpose}, {} bodies, {} collision pairs)",
         shown(path),
         if is_ok { "ok" } else { "not ok" },
         resolved.cell.bodies.len(),
@@ -149,7 +157,7 @@ fn in_words(
     {
         write!(
             text,
-            "\n  start posture: within the joints' limits; nearest are {} and {}, {:.1} mm apart",
+            "\n  start posture: within the joint limits; smallest clearance {2:.1} mm ({0} to {1})",
             part_in_words(a),
             part_in_words(b),
             least_m * 1e3
@@ -158,7 +166,7 @@ fn in_words(
     for goal in &preview.goals {
         write!(
             text,
-            "\n  goal {}: {} of 8 configurations can work ({BASIS})",
+            "\n  goal {}: {} of 8 configurations feasible ({BASIS})",
             goal.name, goal.working
         )?;
         let rejected = goal.configurations.iter().filter(|each| !each.works);
@@ -170,7 +178,7 @@ fn in_words(
         let by_criteria = rejected.filter(|each| each.rejections.is_empty());
         let mut missed: Vec<(&str, Vec<&str>)> = Vec::new();
         for each in by_criteria {
-            let criterion = each.missed.unwrap_or("a criterion is missed");
+            let criterion = each.missed.unwrap_or("a criterion failed");
             match missed.iter_mut().find(|(known, _)| *known == criterion) {
                 Some((_, labels)) => labels.push(each.label),
                 None => missed.push((criterion, vec![each.label])),
@@ -206,7 +214,7 @@ fn in_words(
         } else if resolved.phantom.is_some() {
             write!(
                 text,
-                "\n    target: in no lesion and no organ of the phantom"
+                "\n    target: outside all lesions and organs of the phantom"
             )?;
         }
     }

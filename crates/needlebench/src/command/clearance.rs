@@ -18,7 +18,7 @@ use crate::failure::Failure;
 
 #[derive(Debug, Args)]
 pub(crate) struct ClearanceArguments {
-    /// Scenario whose cell is used.
+    /// Scenario with the cell.
     #[arg(value_name = "SCENARIO")]
     pub scenario: PathBuf,
     /// Joint positions, shoulder pan to wrist 3, rad.
@@ -108,8 +108,8 @@ pub(crate) fn clearance(arguments: &ClearanceArguments) -> Result<ExitStatus, Fa
         })?;
         return Ok(ExitStatus::Success);
     }
-    let mut table = needlebench_report::plain_table(&["class", "clearance (mm)", "between", "and"]);
-    // The least first.
+    let mut table = needlebench_show::plain_table(&["class", "clearance (mm)", "between", "and"]);
+    // In ascending order.
     let mut sorted: Vec<_> = classes.iter().collect();
     sorted.sort_by(|(_, a), (_, b)| a.minimum_m.total_cmp(&b.minimum_m));
     for (class, answer) in sorted {

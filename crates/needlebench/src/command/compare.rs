@@ -13,10 +13,11 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use needlebench_cell::{FileKind, Finding, Overrides, or_wrong_kind, read_data_text};
 use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::compare::{CompareOptions, compare as compare_reports};
 use needlebench_evaluation::{Compared, StoredReport};
+use needlebench_input::{FileKind, Finding, or_wrong_kind, read_data_text};
+use needlebench_scenario::Overrides;
 
 use super::results_folder::probe_file;
 use super::{load_runnable, print_json, print_text};
@@ -35,14 +36,14 @@ use needlebench_report::{comparison_junit, comparison_markdown, write_atomically
 #[derive(Debug, Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct CompareArguments {
-    /// First result: a report.json, a results folder, or a scenario, which is then run; or a study's
-    /// folder or results.parquet, and with a run on the other side --case.
+    /// First result: a report.json, a results folder, or a scenario (run first); or a study's folder or
+    /// results.parquet, with --case if the other is a run.
     #[arg(value_name = "A")]
     pub a: PathBuf,
-    /// Second result, likewise.
+    /// Second result, of the same kinds.
     #[arg(value_name = "B")]
     pub b: PathBuf,
-    /// Engine for scenarios that have to be run first.
+    /// Physics engine for scenarios that are run first.
     #[arg(
         long,
         value_name = "ENGINE[,ENGINE]",
@@ -50,30 +51,29 @@ pub(crate) struct CompareArguments {
         default_value = "rapier"
     )]
     pub engine: EngineArgument,
-    /// Case of a study that is compared with a run.
+    /// Case of the study to compare with the run.
     #[arg(long, value_name = "ID")]
     pub case: Option<u64>,
-    /// A goal of A that is called otherwise in B; may be given several times.
+    /// Goal that has another name in B; repeatable.
     #[arg(long, value_name = "A=B")]
     pub goal: Vec<Pair>,
-    /// Largest loss of a metric that is allowed, with its unit: clearance=0.5mm, tip_error=5%; may be
-    /// given several times. `--help` lists the metrics. 0, with or without a unit, allows no loss at all,
-    /// not even rounding.
+    /// Largest permitted loss of a metric, with its unit, e.g. clearance=0.5mm or tip_error=5%; repeatable. `--help`
+    /// lists the metrics. 0, with or without a unit, permits no loss, not even rounding.
     #[arg(long, value_name = "METRIC=VALUE")]
     pub max_loss: Vec<Pair>,
-    /// TOML file with such losses under [max_loss]; those of the command line go before it.
+    /// TOML file with such losses under [max_loss]; command-line values take precedence.
     #[arg(long, value_name = "TOML")]
     pub thresholds: Option<PathBuf>,
-    /// Do not fail where a configuration no longer works.
+    /// Do not fail if a configuration is no longer feasible.
     #[arg(long)]
     pub allow_status_change: bool,
-    /// Do not fail where a goal, a configuration, a metric or cases of A are missing in B.
+    /// Do not fail if a goal, a configuration, a metric or cases of A are missing in B.
     #[arg(long)]
     pub allow_lost: bool,
-    /// Print a row for each configuration and metric, as wide as it is, instead of one screen.
+    /// Print a row for each configuration and metric at full width instead of one screen.
     #[arg(long, conflicts_with = "json")]
     pub wide: bool,
-    /// With --wide, which it implies: list values that did not change too.
+    /// List unchanged values too; implies --wide.
     #[arg(long)]
     pub all: bool,
     /// Print one JSON document.
@@ -85,7 +85,7 @@ pub(crate) struct CompareArguments {
     /// Write a Markdown summary to this file.
     #[arg(long, value_name = "FILE")]
     pub markdown: Option<PathBuf>,
-    /// Show no progress.
+    /// Do not show progress.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -102,7 +102,7 @@ impl std::str::FromStr for Pair {
             Some((a, b)) if !a.trim().is_empty() && !b.trim().is_empty() => {
                 Ok(Self((a.trim().to_owned(), b.trim().to_owned())))
             }
-            _ => Err("needs a name, `=` and what it stands for".to_owned()),
+            _ => Err("expected NAME=VALUE".to_owned()),
         }
     }
 }
@@ -125,7 +125,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitStatus, Failur
     let comparison = compare_reports(&a, &b, &options).map_err(|error| {
         Finding::new(b.source(), error.to_string())
             .key("--goal")
-            .hint("name goals that changed their name with --goal A=B")
+            .hint("match renamed goals with --goal A=B")
     })?;
     let write = |path: &Path, text: String| {
         write_atomically(path, text.as_bytes())
@@ -151,7 +151,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitStatus, Failur
     Ok(ExitStatus::of(comparison.verdict))
 }
 
-/// What to compare, read or run. Everything that can be wrong on the command line comes first.
+/// Reads or runs what to compare. Errors of the command line are found first.
 fn compared(
     arguments: &CompareArguments,
 ) -> Result<(CompareOptions, StoredReport, StoredReport), Failure> {
@@ -166,8 +166,8 @@ fn compared(
     }
     let [of_a, of_b] = [&arguments.a, &arguments.b].map(|path| is_study(path));
     if arguments.case.is_some() && !of_a && !of_b {
-        return Err(Finding::new("--case", "neither of the two is a study")
-            .hint("it is the case of a study that a run is compared with")
+        return Err(Finding::new("--case", "neither A nor B is a study")
+            .hint("--case selects the case of a study to compare with a run")
             .into());
     }
     let read = |path| input(path, arguments.case);
@@ -196,7 +196,7 @@ fn options(arguments: &CompareArguments) -> Result<CompareOptions, Vec<Finding>>
 enum Input {
     /// A report that was stored.
     Stored(StoredReport),
-    /// A scenario that has to be run first.
+    /// A scenario to run first.
     Scenario(PathBuf, Box<Runnable>),
 }
 
@@ -229,7 +229,7 @@ fn input(path: &Path, case: Option<u64>) -> Result<Input, Failure> {
         let hint = error.hint("give a report.json, a results folder, or a scenario");
         finding.hint = Some(results_below(path).map_or_else(
             || hint.to_owned(),
-            |below| format!("`{name}` has the results of several scenarios: try {below}"),
+            |below| format!("`{name}` contains the results of several scenarios, e.g. {below}"),
         ));
         finding
     })?;
@@ -238,7 +238,7 @@ fn input(path: &Path, case: Option<u64>) -> Result<Input, Failure> {
     Ok(Input::Stored(stored))
 }
 
-/// The first results folder in a folder, if it holds such.
+/// The first results folder in a folder, if it contains any.
 fn results_below(folder: &Path) -> Option<String> {
     let entries = std::fs::read_dir(folder).ok()?;
     let mut found: Vec<PathBuf> = entries

@@ -4,28 +4,28 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
-use needlebench_cell::Finding;
+use needlebench_bench::provenance::GIT_REVISION;
+use needlebench_bench::{forget_kept_meshes, kept_meshes};
 use needlebench_engine::ENGINES;
 use needlebench_engine::mujoco::{
     EnvironmentError, PythonVersion, WheelPlatform, WheelsFor, download_wheels, prepare,
 };
+use needlebench_input::Finding;
 use serde::Serialize;
 
 use super::{print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::output::complain;
-use needlebench_bench::provenance::GIT_REVISION;
-use needlebench_bench::{forget_kept_meshes, kept_meshes};
 
-/// How MuJoCo is set up ahead.
+/// How MuJoCo is installed in advance.
 pub(crate) const DOCTOR_HELP: &str = "\
-MuJoCo's Python environment is made on first use, in NEEDLEBENCH_CACHE_DIR or else the user's cache folder, out \
-of wheels whose hashes the program knows. `--prepare` makes it ahead: on the login node of a cluster, in an \
-image. It holds for the same Python at the same path, and may be read-only from then on.
+MuJoCo's Python environment is created on first use, in NEEDLEBENCH_CACHE_DIR or else the user's cache folder, \
+from wheels with known hashes. `--prepare` creates it in advance: on the login node of a cluster, in an image. It is \
+valid for the same Python at the same path, and may be read-only afterwards.
 
-Without a network: fetch the wheels on a machine that has one, for the system and the Python of the other, \
-carry the folder over, and make the environment from it:
+Offline: download the wheels on a machine with a network, for the system and the Python of the offline machine, copy \
+the folder, and create the environment from it:
   needlebench doctor --download wheels --for-python 3.12
   needlebench doctor --prepare --wheels wheels
 
@@ -33,23 +33,23 @@ Example: needlebench doctor --prepare";
 
 #[derive(Debug, Args)]
 pub(crate) struct DoctorArguments {
-    /// Make MuJoCo's environment ahead, if it is not there yet; say where it is and how big.
+    /// Create MuJoCo's environment unless it exists; print its folder and size.
     #[arg(long)]
     prepare: bool,
-    /// Make it from the wheels in this folder, without a network.
+    /// With --prepare: create it offline, from the wheels in this folder.
     #[arg(long, value_name = "DIR", requires = "prepare")]
     wheels: Option<PathBuf>,
-    /// Fetch the wheels into this folder, for a machine without a network.
+    /// Download the wheels into this folder, for an offline machine.
     #[arg(long, value_name = "DIR", conflicts_with = "prepare")]
     download: Option<PathBuf>,
-    /// The Python that wheels are fetched for, such as 3.12, in place of this machine's.
+    /// With --download: Python version of the wheels, e.g. 3.12 [default: this machine's].
     #[arg(long, value_name = "VERSION", requires = "download")]
     for_python: Option<PythonVersion>,
-    /// The system that wheels are fetched for, in place of this one: linux-x86_64, linux-aarch64, macos-arm64,
-    /// windows-x86_64.
+    /// With --download: system of the wheels, linux-x86_64, linux-aarch64, macos-arm64 or windows-x86_64 [default: this
+    /// machine's].
     #[arg(long, value_name = "SYSTEM", requires = "download")]
     for_platform: Option<WheelPlatform>,
-    /// Remove what is kept of meshes between runs, surfaces of patients among them; it is made again where needed.
+    /// Clear the mesh cache, which may contain patient surfaces; it is rebuilt when needed.
     #[arg(long, conflicts_with_all = ["prepare", "download"])]
     clear_meshes: bool,
     /// Print one JSON document.
@@ -60,7 +60,7 @@ pub(crate) struct DoctorArguments {
 #[derive(Serialize)]
 struct PrepareAnswer {
     schema_version: u32,
-    /// Where the environment is; none where another program stands in the harness's place.
+    /// Folder of the environment; none if another program replaces the harness.
     folder: Option<PathBuf>,
     python: PathBuf,
     size_bytes: Option<u64>,
@@ -94,7 +94,7 @@ struct Check {
     detail: String,
 }
 
-/// Checks what the engines need, makes it, or fetches what it is made of.
+/// Checks the environment of the engines, creates it, or downloads its wheels.
 pub(crate) fn doctor(arguments: &DoctorArguments) -> Result<ExitStatus, Failure> {
     if let Some(folder) = &arguments.download {
         return fetch_wheels(folder, arguments);
@@ -102,7 +102,7 @@ pub(crate) fn doctor(arguments: &DoctorArguments) -> Result<ExitStatus, Failure>
     if arguments.clear_meshes {
         forget_kept_meshes().map_err(|error| Failure::Ended {
             status: ExitStatus::EnvironmentFailed,
-            message: format!("error: what is kept of meshes cannot be removed: {error}"),
+            message: format!("error: cannot clear the mesh cache: {error}"),
         })?;
     }
     if arguments.prepare {
@@ -115,7 +115,7 @@ fn prepare_environment(arguments: &DoctorArguments) -> Result<ExitStatus, Failur
     if let Some(wheels) = arguments.wheels.as_ref().filter(|folder| !folder.is_dir()) {
         let message = format!("there is no folder {}", wheels.display());
         return Err(Finding::new("--wheels", message)
-            .hint("`needlebench doctor --download DIR` fetches the wheels on a machine with a network")
+            .hint("`needlebench doctor --download DIR` downloads the wheels on a machine with a network")
             .into());
     }
     let prepared = prepare(arguments.wheels.as_deref(), &mut told(arguments.json))
@@ -133,17 +133,17 @@ fn prepare_environment(arguments: &DoctorArguments) -> Result<ExitStatus, Failur
     }
     print_text(&match (&environment.folder, prepared.size_bytes) {
         (Some(folder), Some(bytes)) => format!(
-            "MuJoCo's environment is {} {} ({})",
+            "MuJoCo's environment {} {} ({})",
             if prepared.made {
-                "ready in"
+                "created in"
             } else {
-                "there already:"
+                "exists in"
             },
             folder.display(),
             megabytes(bytes)
         ),
         _ => format!(
-            "nothing to prepare: NEEDLEBENCH_HARNESS_COMMAND stands in for it ({})",
+            "nothing to prepare: NEEDLEBENCH_HARNESS_COMMAND replaces the environment ({})",
             environment.python.display()
         ),
     })?;
@@ -172,14 +172,14 @@ fn fetch_wheels(folder: &Path, arguments: &DoctorArguments) -> Result<ExitStatus
         print_text(&format!("{} ({})", file.display(), megabytes(*bytes)))?;
     }
     print_text(&format!(
-        "wheels for Python {}; on the other machine: needlebench doctor --prepare --wheels {}",
+        "wheels for Python {}; on the offline machine: needlebench doctor --prepare --wheels {}",
         fetched.python,
         folder.display()
     ))?;
     Ok(ExitStatus::Success)
 }
 
-/// Says on standard error what is being done, unless a program reads.
+/// Prints progress to standard error, unless the answer is JSON.
 fn told(json: bool) -> impl FnMut(&str) {
     move |text| {
         if !json {
@@ -199,7 +199,7 @@ fn megabytes(bytes: u64) -> String {
     format!("{:.1} MB", bytes as f64 * 1e-6)
 }
 
-/// What is kept of meshes, and how to be rid of it.
+/// The mesh cache, and how to clear it.
 fn kept_in_words() -> String {
     let folders = kept_meshes();
     if folders.is_empty() {
@@ -210,12 +210,12 @@ fn kept_in_words() -> String {
         .map(|(folder, bytes)| format!("{} in {}", megabytes(*bytes), folder.display()))
         .collect();
     format!(
-        "{}; surfaces of patients may be among them, --clear-meshes removes all",
+        "{}; may contain patient surfaces, --clear-meshes removes all",
         texts.join(", ")
     )
 }
 
-/// Checks what the engines need.
+/// Checks the environment of the engines.
 fn check_engines(json: bool) -> Result<ExitStatus, Failure> {
     let mut checks = vec![
         Check {
@@ -230,7 +230,7 @@ fn check_engines(json: bool) -> Result<ExitStatus, Failure> {
                 .map_or_else(|error| error.to_string(), |count| count.to_string()),
         },
         Check {
-            name: "kept meshes",
+            name: "mesh cache",
             ok: true,
             detail: kept_in_words(),
         },

@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use needlebench_cell::{Finding, ResolvedScenario, nearest_name, sha256_hex};
 use needlebench_export::{ExportError, ExportedFile, Packing, Shown, gltf, mjcf, urdf};
+use needlebench_input::{Finding, nearest_name, sha256_hex};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_report::write_atomically;
+use needlebench_scenario::ResolvedScenario;
 use serde::Serialize;
 
 use super::atlas::goals;
@@ -23,19 +24,19 @@ use crate::output::shown;
 
 #[derive(Debug, Args)]
 pub(crate) struct ExportArguments {
-    /// Scenario that is exported.
+    /// Scenario to export.
     #[arg(value_name = "SCENARIO")]
     pub scenario: PathBuf,
     /// Format.
     #[arg(long = "as", value_name = "FORMAT", value_enum)]
     pub format: Format,
-    /// One goal, for formats of a posture or a motion; the scenario's only one if left out.
+    /// Goal, for formats of a posture or a motion [default: the scenario's only goal].
     #[arg(long, value_name = "NAME")]
     pub goal: Option<String>,
-    /// One configuration of the goal, such as Right-Up-Fold; of a motion the recommended one if left out.
+    /// Configuration of the goal, e.g. Right-Up-Fold [default for a motion: the recommended one].
     #[arg(long, value_name = "CONFIGURATION")]
     pub configuration: Option<String>,
-    /// Engine whose motion it is, for formats of a motion; rapier if left out.
+    /// Physics engine that simulates the motion, for formats of a motion [default: rapier].
     #[arg(long, value_name = "ENGINE", value_parser = EngineParser)]
     pub engine: Option<EngineArgument>,
     /// Joint positions, shoulder pan to wrist 3, rad, for formats of a posture.
@@ -46,8 +47,7 @@ pub(crate) struct ExportArguments {
         conflicts_with_all = ["goal", "configuration"]
     )]
     pub joints: Option<Six>,
-    /// File to write; files that belong to it are written beside it. Left out, a file of the scenario's name in the
-    /// folder where its results go, out/NAME.
+    /// File to write; its other files are written beside it [default: a file of the scenario's name in out/NAME].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Print one JSON document.
@@ -57,39 +57,39 @@ pub(crate) struct ExportArguments {
     pub robot: RobotArguments,
 }
 
-/// What other tools read.
+/// Export formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
-    /// The whole cell as a model of MuJoCo.
+    /// The whole cell as a MuJoCo model.
     Mjcf,
-    /// A motion as an engine recorded it, as messages of ROS 2 in an MCAP file.
+    /// A motion as recorded by an engine, as ROS 2 messages in an MCAP file.
     Mcap,
-    /// A planned motion as a joint trajectory of ROS 2: JSON, YAML or CSV.
+    /// A planned motion as a ROS 2 joint trajectory: JSON, YAML or CSV.
     Trajectory,
-    /// A planned motion as a program for the arm's controller.
+    /// A planned motion as a URScript program for the arm's controller.
     Urscript,
-    /// The whole cell as a robot description for ROS: URDF, SRDF, and a package of the surfaces that they name.
+    /// The whole cell as a robot description for ROS: URDF, SRDF and a package with their meshes.
     Urdf,
-    /// The whole cell in a posture as a picture in space, for Blender, slides and viewers: binary glTF.
+    /// The whole cell in a posture as a 3D scene, for Blender, slides and viewers: binary glTF.
     Gltf,
 }
 
-/// What is true of a format.
+/// Properties of a format.
 struct Traits {
     /// Extension of the file that people open.
     extension: &'static str,
-    /// What it is, for people.
+    /// Its description.
     what: &'static str,
-    /// It is of one posture.
+    /// It has one posture.
     posture: bool,
-    /// It is of one motion: of a goal in a configuration.
+    /// It has one motion, to a goal in a configuration.
     motion: bool,
-    /// It is of what an engine recorded.
+    /// It requires the recording of an engine.
     recording: bool,
 }
 
 impl Traits {
-    /// Of formats of one motion, which a run in an engine says that it works.
+    /// Formats of one motion, whose feasibility a run in an engine confirms.
     fn of_motion(extension: &'static str, what: &'static str) -> Self {
         Self {
             extension,
@@ -106,16 +106,16 @@ impl Format {
         match self {
             Self::Mjcf => Traits {
                 extension: "xml",
-                what: "the cell as a model of MuJoCo",
+                what: "the cell as a MuJoCo model",
                 posture: false,
                 motion: false,
                 recording: false,
             },
-            Self::Mcap => Traits::of_motion("mcap", "a recorded motion as messages of ROS 2"),
+            Self::Mcap => Traits::of_motion("mcap", "a recorded motion as ROS 2 messages"),
             Self::Trajectory => Traits::of_motion("json", "a planned motion as a joint trajectory"),
             Self::Urscript => Traits::of_motion(
                 "script",
-                "a planned motion as a program, never run on a robot",
+                "a planned motion as a URScript program, not tested on a robot",
             ),
             Self::Urdf => Traits {
                 extension: "urdf",
@@ -126,7 +126,7 @@ impl Format {
             },
             Self::Gltf => Traits {
                 extension: "glb",
-                what: "the cell in a posture as a picture in space",
+                what: "the cell in a posture as a 3D scene",
                 posture: true,
                 motion: false,
                 recording: false,
@@ -155,16 +155,16 @@ struct FileAnswer {
     sha256: String,
 }
 
-/// What of the scenario is wanted.
+/// What to export of the scenario.
 struct Wanted<'a> {
     resolved: &'a ResolvedScenario,
     /// Name of the file that people open, without its extension.
     stem: &'a str,
-    /// Of the file that is asked for.
+    /// Packing of the requested file.
     packing: Packing,
     /// Index of a goal, and a configuration of it.
     chosen: Option<(usize, Configuration)>,
-    /// A posture of the user's own.
+    /// A posture from the command line.
     joints: Option<Joints>,
 }
 
@@ -193,7 +193,7 @@ impl Wanted<'_> {
     }
 }
 
-/// Writes a scenario in the format of another tool.
+/// Exports a scenario to another tool's format.
 pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus, Failure> {
     check_options(arguments)?;
     let overrides = overrides(&arguments.robot)?;
@@ -222,20 +222,17 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus, Failure>
     if let Some((first, others)) = files.split_first_mut() {
         first.name = format!("{stem}{extension}");
         if others.iter().any(|other| other.name == first.name) {
-            let message = format!(
-                "the export writes another file beside it of the name {}",
-                first.name
-            );
+            let message = format!("the export also writes another file named {}", first.name);
             return Err(Finding::new(&resolved.source.file, message)
                 .key("--out")
-                .hint("choose another extension, such as the format's own")
+                .hint("choose another extension, e.g. the default one of the format")
                 .into());
         }
     }
     finish(arguments, &resolved, &folder, &files)
 }
 
-/// Writes the files and says which they are.
+/// Writes and lists the files.
 fn finish(
     arguments: &ExportArguments,
     resolved: &ResolvedScenario,
@@ -253,7 +250,7 @@ fn finish(
         })?;
     } else {
         let mut lines = vec![format!("{}: {}", resolved.scenario.name, traits.what)];
-        // A cell has up to a hundred surfaces: their folder says it.
+        // A cell has up to a hundred surfaces: their folder is enough.
         let (shown_files, further) = written.split_at(written.len().min(MOST_FILES_SHOWN));
         lines.extend(
             shown_files
@@ -261,17 +258,17 @@ fn finish(
                 .map(|file| format!("{} ({} bytes)", shown(Path::new(&file.name)), file.bytes)),
         );
         if !further.is_empty() {
-            lines.push(format!("and {} more beside them", further.len()));
+            lines.push(format!("and {} more files", further.len()));
         }
         print_text(&lines.join("\n"))?;
     }
     Ok(ExitStatus::Success)
 }
 
-/// Files that are listed for people.
+/// Number of files listed in the printed text.
 const MOST_FILES_SHOWN: usize = 6;
 
-/// Refuses options that the format has nothing to do with: what is ignored is believed to be heeded.
+/// Rejects options that do not apply to the format, instead of ignoring them.
 fn check_options(arguments: &ExportArguments) -> Result<(), Finding> {
     let traits = arguments.format.traits();
     let choice = traits.posture || traits.motion;
@@ -290,13 +287,13 @@ fn check_options(arguments: &ExportArguments) -> Result<(), Finding> {
                     traits.what
                 ),
             );
-            return Err(finding.key(option).hint(format!("leave {option} out")));
+            return Err(finding.key(option).hint(format!("remove {option}")));
         }
     }
     Ok(())
 }
 
-/// The goal and the configuration that are wanted; none if none is named.
+/// The requested goal and configuration; none if none is named.
 fn chosen(
     arguments: &ExportArguments,
     resolved: &ResolvedScenario,
@@ -309,11 +306,11 @@ fn chosen(
         let names: Vec<&str> = resolved.goals.iter().map(|goal| &*goal.name).collect();
         let finding = Finding::new(
             &resolved.source.file,
-            format!("it has {} goals, and none is named", found.len()),
+            format!("the scenario has {} goals; --goal is missing", found.len()),
         );
         return Err(finding
             .key("--goal")
-            .hint(format!("name one with --goal: {}", names.join(", "))));
+            .hint(format!("select one with --goal: {}", names.join(", "))));
     };
     let index = resolved
         .goals
@@ -321,7 +318,7 @@ fn chosen(
         .position(|each| each.name == goal.name);
     let labels = || Configuration::ALL.map(Configuration::label);
     let Some(label) = arguments.configuration.as_deref() else {
-        let finding = Finding::new("the command line", "--goal needs a --configuration");
+        let finding = Finding::new("the command line", "--goal requires --configuration");
         return Err(finding
             .key("--configuration")
             .hint(format!("configurations: {}", labels().join(", "))));
@@ -347,7 +344,7 @@ fn configuration_named(label: &str) -> Result<Configuration, Finding> {
     })
 }
 
-/// The posture that was given, which has to be one that the arm can have.
+/// The given posture, checked against the joint limits.
 fn joints(
     arguments: &ExportArguments,
     resolved: &ResolvedScenario,
@@ -365,7 +362,7 @@ fn joints(
     let finding = Finding::new(
         "the command line",
         format!(
-            "{} is {} rad, outside of its limits from {:.4} to {:.4} rad",
+            "{} is {} rad, outside its limits {:.4} to {:.4} rad",
             needlebench_kinematics::JOINT_LABELS[joint],
             q[joint],
             limit.lower_rad,
@@ -401,7 +398,7 @@ fn place(
         .and_then(|stem| stem.to_str())
         .zip(out.file_name().and_then(|name| name.to_str()))
     else {
-        return refuse("it names no file");
+        return refuse("it is not a file name");
     };
     let folder = out.parent().map(Path::to_owned).unwrap_or_default();
     Ok((folder, stem.to_owned(), name[stem.len()..].to_owned()))

@@ -7,10 +7,11 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use needlebench_bench::suggest::SuggestError;
 use needlebench_bench::{Control, Starter, StarterOptions, Template, starter, starter_study};
-use needlebench_cell::phantom::{Phantom, SIZE_PRESETS};
-use needlebench_cell::scenario::shipped_tools;
-use needlebench_cell::{Arm, Finding, nearest_name};
+use needlebench_input::{Finding, nearest_name};
+use needlebench_phantom::{Phantom, SIZE_PRESETS};
 use needlebench_report::write_atomically;
+use needlebench_robot::Arm;
+use needlebench_scenario::scenario::shipped_tools;
 use serde::Serialize;
 
 use super::schema::{SchemaFormat, document};
@@ -29,28 +30,28 @@ use crate::progress::TerminalProgress;
     reason = "switches of the command line"
 )]
 pub(crate) struct InitArguments {
-    /// File to write, or a folder for a file of the name `first.toml`.
+    /// File to write, or a folder for `first.toml`.
     #[arg(value_name = "FILE|DIR", default_value = "first.toml")]
     pub path: PathBuf,
-    /// What to begin from.
+    /// Template.
     #[arg(long, value_enum, default_value = "table")]
     pub from: FromArgument,
-    /// A shipped arm.
+    /// Bundled arm.
     #[arg(long, value_name = "ARM", default_value = "ur3")]
     pub arm: String,
-    /// A shipped phantom: the patient's size.
+    /// Bundled phantom, by patient size.
     #[arg(long, value_name = "NAME", default_value = "male-p50-supine")]
     pub phantom: String,
-    /// One of the phantom's lesions; one that the robot serves well if left out.
+    /// Lesion of the phantom [default: one that is feasible for the template's robot].
     #[arg(long, value_name = "NAME")]
     pub lesion: Option<String>,
-    /// Write a small study of the scenario too, beside it.
+    /// Also write a small study of the scenario beside it.
     #[arg(long)]
     pub study: bool,
-    /// Replace files that are there.
+    /// Replace existing files.
     #[arg(long)]
     pub force: bool,
-    /// Write nothing, and say which arms, tools, phantoms, lesions and templates there are.
+    /// List the available arms, tools, phantoms, lesions and templates; write nothing.
     #[arg(long)]
     pub list: bool,
     /// With --list: print one JSON document.
@@ -58,14 +59,14 @@ pub(crate) struct InitArguments {
     pub json: bool,
 }
 
-/// What a scenario begins from.
+/// Templates of a first scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FromArgument {
-    /// Robot on a column beside the CT table, patient on the back.
+    /// Robot on a column beside the CT table, patient supine.
     Table,
-    /// Robot hanging from the ceiling, patient on the back.
+    /// Robot hanging from the ceiling, patient supine.
     Hanging,
-    /// Robot on a column behind a patient on the left side.
+    /// Robot on a column behind a patient in left lateral position.
     Lateral,
 }
 
@@ -79,7 +80,7 @@ impl From<FromArgument> for Template {
     }
 }
 
-/// What there is to choose from.
+/// The available choices.
 #[derive(Serialize)]
 struct Choices {
     schema_version: u32,
@@ -87,7 +88,7 @@ struct Choices {
     arms: Vec<&'static str>,
     tools: Vec<String>,
     phantoms: Vec<&'static str>,
-    /// Of the phantom that is asked for.
+    /// Name of the requested phantom.
     phantom: String,
     lesions: Vec<LesionChoice>,
 }
@@ -100,7 +101,7 @@ struct LesionChoice {
     diameter_m: f64,
 }
 
-/// Writes a first scenario, or says what there is.
+/// Writes a first scenario, or lists the choices.
 pub(crate) fn init(arguments: &InitArguments) -> Result<ExitStatus, Failure> {
     let choices = choices(arguments)?;
     if arguments.list {
@@ -137,7 +138,7 @@ pub(crate) fn init(arguments: &InitArguments) -> Result<ExitStatus, Failure> {
     }
 }
 
-/// What there is, with the lesions of the phantom that is asked for.
+/// The available choices, with the lesions of the requested phantom.
 fn choices(arguments: &InitArguments) -> Result<Choices, Finding> {
     let lesions = Phantom::size_preset(&arguments.phantom)
         .map_err(|_| unknown("--phantom", &arguments.phantom, &SIZE_PRESETS))?
@@ -171,7 +172,7 @@ fn unknown(argument: &str, given: &str, known: &[&str]) -> Finding {
     })
 }
 
-/// The file, and what is wanted in it.
+/// The file and its content.
 fn options(
     arguments: &InitArguments,
     choices: &Choices,
@@ -208,8 +209,8 @@ fn options(
         .unwrap_or_default();
     let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if !is_toml || name.is_empty() || !name.chars().all(is_name) {
-        return Err(Finding::new(&file, "this is no name of a scenario's file").hint(
-            "letters, digits, `-` and `_`, and the ending `.toml`: results go to a folder of that name",
+        return Err(Finding::new(&file, "not a valid name for a scenario file").hint(
+            "use letters, digits, `-` and `_`, and the extension `.toml`: the results folder has the same name",
         ));
     }
     let written = [
@@ -219,8 +220,8 @@ fn options(
     for path in written.into_iter().flatten() {
         if path.exists() && !arguments.force {
             let file = path.display().to_string();
-            return Err(Finding::new(file, "there is such a file already")
-                .hint("choose another name, or replace it with --force"));
+            return Err(Finding::new(file, "the file exists already")
+                .hint("choose another name, or add --force"));
         }
     }
     let options = StarterOptions {
@@ -249,10 +250,10 @@ fn write_files(
     };
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+            .with_context(|| format!("cannot create the folder {}", folder.display()))?;
     }
     write(path, &starter.text)?;
-    // Made by the program, so that an older one is never worth keeping.
+    // Written by the program, so that an older one can be replaced.
     let schema = |format: SchemaFormat| -> Result<String> {
         Ok(serde_json::to_string_pretty(&document(format))? + "\n")
     };
@@ -281,7 +282,7 @@ fn said(
 ) -> String {
     let entry = &starter.entry;
     let mut text = format!(
-        "{}: {} for {}, {}\n  needle {:.0} mm deep, {} of 8 configurations can work (postures only, motions not planned)\n",
+        "{}: {} for {}, {}\n  insertion depth {:.0} mm; {} of 8 configurations feasible (postures only)\n",
         shown(path),
         options.arm,
         options.lesion,
@@ -293,34 +294,31 @@ fn said(
         let [x, y, z] = place.position_mm;
         let _ = writeln!(
             text,
-            "  the robot stands at [{x}, {y}, {z}] mm: from the usual place it does not serve this lesion"
+            "  base moved to [{x}, {y}, {z}] mm: this lesion is infeasible from the default placement"
         );
     }
-    let _ = writeln!(
-        text,
-        "  beside it: scenario.schema.json, which editors read"
-    );
+    let _ = writeln!(text, "  also written: scenario.schema.json, for editors");
     text += "next:\n";
     let path = shown(path);
     let mut next = vec![
         (
             format!("needlebench run {path}"),
-            "all of it, with a page to look at",
+            "full run with report page",
         ),
         (
             format!("needlebench check {path}"),
-            "after each change: what can work",
+            "quick check after each change",
         ),
         (
             format!("needlebench suggest {path}"),
-            "other entries, other places",
+            "other entries and base placements",
         ),
     ];
     if arguments.study {
         let study = study_path(Path::new(&path), &options.name);
         next.push((
             format!("needlebench study {}", shown(&study)),
-            "how much the patient may be off",
+            "tolerance to patient displacement",
         ));
     }
     let width = next
@@ -344,12 +342,12 @@ impl Choices {
         let _ = writeln!(text, "tools ([tool] urdf)\n  {}", self.tools.join(", "));
         let _ = writeln!(
             text,
-            "--phantom: male and female, 5th, 50th and 95th percentile, lying (-supine) or upright\n  {}",
+            "--phantom: male and female, 5th, 50th and 95th percentile, supine (-supine) or upright\n  {}",
             self.phantoms.join(", ")
         );
         let _ = writeln!(
             text,
-            "--lesion: of {}; left, posterior, superior from mid-chest, mm",
+            "--lesion: in {}; left, posterior, superior from mid-chest, mm",
             self.phantom
         );
         for LesionChoice {

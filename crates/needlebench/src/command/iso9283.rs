@@ -6,11 +6,11 @@ use std::path::Path;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use needlebench_cell::{FileKind, Finding, or_wrong_kind, read_data_text};
-use needlebench_evaluation::iso9283::{
+use needlebench_evaluation::report::Verdict;
+use needlebench_input::{FileKind, Finding, or_wrong_kind, read_data_text};
+use needlebench_iso9283::{
     Attained, LogUnits, MeasuredReport, RotationColumns, measured_report, read_commanded, read_log,
 };
-use needlebench_evaluation::report::Verdict;
 use serde::Serialize;
 
 use super::results_folder::probe_file;
@@ -25,53 +25,53 @@ use needlebench_report::table::iso9283::measured_text;
 use needlebench_report::{JudgedLimit, limits_junit, write_atomically};
 
 pub(crate) const ISO9283_HELP: &str = "\
-Both files are tables whose first line names the columns and their units; comma, semicolon (with \
-decimal commas) or tab between them; lines that start with #, // or % are comments. `needlebench \
-run` of a scenario with [iso9283] writes both as an example.
+Both files are tables whose first line has the column names with units, separated by commas, semicolons (with \
+decimal commas) or tabs; lines that start with #, // or % are comments. `needlebench run` of a scenario with \
+[iso9283] writes examples of both.
 
   pose         P1 to P5 or 1 to 5; P3_07 is pose 3 in cycle 7
   x_mm y_mm z_mm   or x [mm], X (m) and so on: m, mm, um or in
-  cycle        1, 2, 3 ...; counted if there is none
-  direction    x, y or z where a pose was approached along an axis (for vAP), else empty
+  cycle        1, 2, 3 ...; counted if missing
+  direction    x, y or z if the pose was approached along an axis (for vAP), otherwise empty
   qw qx qy qz  orientation, or rx_deg ry_deg rz_deg with --rotation
   time_s       seconds, or dates like 2026-01-31T12:00:00
 
-Positions are in the robot's base frame; --fit-frame finds the tracker's own frame first.
+Positions are in the robot's base frame; with --fit-frame, in the tracker's frame.
 
 Example: needlebench iso9283 --csv robot.csv --commanded commanded.csv --max-rp 0.1
 Example: needlebench iso9283 --csv export.txt --commanded poses.csv --length-unit mm --fit-frame";
 
 #[derive(Debug, Args)]
 pub(crate) struct Iso9283Arguments {
-    /// The tracker's log: a row for each measured pose.
+    /// Log of the tracker: one row per measured pose.
     #[arg(long, value_name = "CSV")]
     pub csv: PathBuf,
-    /// Commanded poses: a row for each pose.
+    /// Commanded poses: one row per pose.
     #[arg(long, value_name = "CSV")]
     pub commanded: PathBuf,
-    /// The log is in the tracker's own frame: find it by the best fit of the mean positions to the
-    /// commanded ones. AP is then without the error of the base's place.
+    /// Register the tracker's frame by the best fit of the mean positions to the commanded ones; AP then excludes the
+    /// error of the base placement.
     #[arg(long)]
     pub fit_frame: bool,
-    /// Unit of lengths where the header does not say it.
+    /// Unit of lengths without a unit in the header.
     #[arg(long, value_enum, value_name = "UNIT")]
     pub length_unit: Option<LengthUnit>,
-    /// Unit of angles where the header does not say it.
+    /// Unit of angles without a unit in the header.
     #[arg(long, value_enum, value_name = "UNIT")]
     pub angle_unit: Option<AngleUnit>,
-    /// What columns rx, ry, rz mean.
+    /// Meaning of columns rx, ry, rz.
     #[arg(long, value_enum, value_name = "MEANING")]
     pub rotation: Option<RotationArgument>,
-    /// Largest pose accuracy AP of any pose, mm.
+    /// Limit of the pose accuracy AP of any pose, mm.
     #[arg(long, value_name = "MM")]
     pub max_ap: Option<f64>,
-    /// Largest pose repeatability RP of any pose, mm.
+    /// Limit of the pose repeatability RP of any pose, mm.
     #[arg(long, value_name = "MM")]
     pub max_rp: Option<f64>,
-    /// Largest multi-directional variation vAP of any pose, mm.
+    /// Limit of the multi-directional variation vAP of any pose, mm.
     #[arg(long, value_name = "MM")]
     pub max_vap: Option<f64>,
-    /// Folder for report.json, the measurements in the base frame, and a picture.
+    /// Folder for report.json, the measurements in the base frame, and a chart.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Write JUnit XML of the limits to this file.
@@ -129,16 +129,16 @@ impl AngleUnit {
     }
 }
 
-/// What three columns of a rotation mean.
+/// Meaning of the three columns of a rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum RotationArgument {
-    /// Axis times angle, as a UR controller shows poses.
+    /// Axis times angle, as shown by UR controllers.
     RotationVector,
-    /// Turns about the fixed axes x, then y, then z, as SpatialAnalyzer shows frames.
+    /// Rotations about the fixed axes x, then y, then z, as shown by SpatialAnalyzer.
     FixedXyz,
 }
 
-/// The report with its verdict on the command line's limits.
+/// The report, evaluated against the limits of the command line.
 #[derive(Serialize)]
 struct Judged<'a> {
     #[serde(flatten)]
@@ -201,7 +201,7 @@ pub(crate) fn iso9283(arguments: &Iso9283Arguments) -> Result<ExitStatus, Failur
         for limit in judged.limits.iter().filter(|limit| !limit.pass) {
             let (word, value) = match limit.value_m {
                 Some(value_m) => ("FAILED", format!("{:.4} mm", value_m * 1e3)),
-                None => ("not judged", "not measured".to_owned()),
+                None => ("not evaluated", "not measured".to_owned()),
             };
             // Writing to a String cannot fail.
             let _ = writeln!(
@@ -253,7 +253,7 @@ fn measured(arguments: &Iso9283Arguments) -> Result<(MeasuredReport, Vec<Attaine
     .map_err(|error| {
         vec![
             Finding::new(log_file, error.to_string())
-                .hint("a test has each pose several times; the standard asks for 30"),
+                .hint("a test repeats each pose; the standard requires 30 cycles"),
         ]
     })
 }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Result;
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 use needlebench_kinematics::ik::{
     Configuration, DampedOptions, GaussNewtonOptions, Kinematics, Solution, SolutionKind,
     Tolerance, WrapSearch, wrap_angle,
@@ -28,17 +28,17 @@ use crate::failure::Failure;
 /// Methods of inverse kinematics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum IkMethod {
-    /// All configurations.
+    /// All solutions, in closed form.
     ClosedForm,
-    /// One, near the seed.
+    /// One solution, near the seed.
     GaussNewton,
-    /// One, from any seed: damped, and started again until it converges.
+    /// One solution from any seed: damped, with restarts until it converges.
     Damped,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct IkArguments {
-    /// Scenario, of which `--goal` is solved.
+    /// Scenario with the `--goal` to solve.
     #[arg(
         value_name = "SCENARIO",
         conflicts_with_all = ["pose", "matrix", "arm"],
@@ -64,29 +64,27 @@ pub(crate) struct IkArguments {
         conflicts_with = "pose"
     )]
     pub matrix: Option<PoseMatrix>,
-    /// Take the rotation that is nearest to the matrix if it is not exactly one, such as after
-    /// rounding.
+    /// Use the rotation nearest to the matrix, e.g. if its digits are rounded.
     #[arg(long, requires = "matrix")]
     pub nearest_rotation: bool,
     /// Method.
     #[arg(long, value_enum, default_value = "closed-form")]
     pub method: IkMethod,
-    /// Joint positions to start from or to be near to, rad.
+    /// Joint positions, rad: initial guess of a numerical method; in closed form the reference to which free joints and
+    /// 2 pi equivalents are nearest.
     #[arg(long, value_name = "q1,..,q6", allow_hyphen_values = true)]
     pub seed: Option<Six>,
-    /// Steps after which a numerical method gives up.
+    /// Iteration limit of a numerical method.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub max_iterations: Option<u32>,
-    /// Time after which a numerical method gives up, ms. What it has found by then depends on the
-    /// machine.
+    /// Time limit of a numerical method, ms; the result depends on the machine.
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..))]
     pub time_limit_ms: Option<u32>,
-    /// By how much a posture may miss the pose and still be a row, flagged as touching: one number for
-    /// m and rad. Without it, what the digits of the pose leave open, at least 1e-7.
+    /// Pose tolerance (m and rad) for boundary solutions [default: resolution of the given digits, at least 1e-7].
     #[arg(long, value_name = "M_AND_RAD")]
     pub tolerance: Option<f64>,
-    /// List whole turns within the joint limits too, nearest to the seed (or to zero) first; at most
-    /// one turn more or less of a joint without limits.
+    /// Also list 2 pi equivalents within the joint limits, nearest to the seed (or zero) first; at most one turn either
+    /// way for joints without limits.
     #[arg(long)]
     pub wraps: bool,
     /// Print one JSON document.
@@ -116,7 +114,7 @@ pub(crate) fn ik(arguments: &IkArguments) -> Result<ExitStatus, Failure> {
     } else {
         print_text(&answer.text())?;
     }
-    // A pose that no posture reaches has no answer.
+    // A pose without a solution is a failure.
     Ok(match answer.count {
         0 => ExitStatus::CriterionFailed,
         _ => ExitStatus::Success,
@@ -126,8 +124,8 @@ pub(crate) fn ik(arguments: &IkArguments) -> Result<ExitStatus, Failure> {
 fn solve(arguments: &IkArguments) -> Result<IkAnswer, Failure> {
     if arguments.method != IkMethod::ClosedForm && arguments.wraps {
         return Err(
-            Finding::new("--wraps", "a numerical method finds one posture only")
-                .hint("whole turns are those of the closed form: leave --method out")
+            Finding::new("--wraps", "a numerical method finds one solution only")
+                .hint("2 pi equivalents require the closed form: remove --method")
                 .into(),
         );
     }
@@ -144,8 +142,8 @@ fn solve(arguments: &IkArguments) -> Result<IkAnswer, Failure> {
     }
     if arguments.method != IkMethod::ClosedForm && arguments.tolerance.is_some() {
         return Err(
-            Finding::new("--tolerance", "a numerical method goes on to rounding")
-                .hint("the tolerance is the closed form's: leave --method out")
+            Finding::new("--tolerance", "a numerical method iterates to rounding")
+                .hint("the tolerance requires the closed form: remove --method")
                 .into(),
         );
     }
@@ -230,14 +228,14 @@ fn closed_form(
     }
 }
 
-/// One posture, by iteration from a guess.
+/// One solution, by iteration from a guess.
 fn numerical(
     arguments: &IkArguments,
     arm: &KinematicArm,
     kinematics: &Kinematics,
     base_link_from_flange: &Pose,
 ) -> IkAnswer {
-    // Away from every singularity, so that the first step is a sensible one.
+    // Away from every singularity, so that the first step is well-conditioned.
     let guess = seed(arguments)
         .unwrap_or_else(|| Joints::from_column_slice(&[0.1, -1.2, -1.2, -1.0, 1.2, 0.1]));
     let max_time = arguments
@@ -295,7 +293,7 @@ fn numerical(
         solutions,
         nearest,
         unreachable: Vec::new(),
-        // A numerical method finds one posture and knows nothing of the others.
+        // A numerical method finds one solution, without information on the others.
         certificate: match kind {
             SolutionKind::Exact | SolutionKind::Touching => "one_of_several",
             SolutionKind::Nearest => "not_converged",

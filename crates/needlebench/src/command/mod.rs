@@ -1,4 +1,4 @@
-//! What each command does.
+//! The commands.
 
 mod atlas;
 mod check;
@@ -25,12 +25,12 @@ mod suggest;
 mod view;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::Result;
-use needlebench_cell::{
-    EntryChooser, Finding, Overrides, PackagePaths, ResolvedScenario, load_scenario, printable_json,
-};
 use needlebench_engine::{ENGINES, engine_names};
+use needlebench_input::{Finding, PackagePaths, printable_json};
+use needlebench_scenario::{EntryChooser, Overrides, ResolvedScenario, load_scenario};
 use serde::Serialize;
 
 pub(crate) use atlas::{AtlasArguments, atlas};
@@ -57,15 +57,14 @@ pub(crate) use study::{MergeArguments, STUDY_HELP, StudyArguments, merge, study}
 pub(crate) use suggest::{SuggestArguments, suggest};
 pub(crate) use view::{VIEW_HELP, ViewArguments, view};
 
-use needlebench_bench::Runnable;
-use needlebench_bench::choose_entry;
+use needlebench_bench::{EntryFinder, Runnable};
 
 use crate::arguments::{RobotArguments, UrdfArguments};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::output::{print_as_it_is, print_text};
 
-/// Reads a scenario and refuses one that cannot be run.
+/// Reads a scenario, and rejects one that cannot be run.
 fn load(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
     load_runnable(path, overrides).map(Runnable::into_scenario)
 }
@@ -92,7 +91,7 @@ fn urdf_overrides(arguments: &UrdfArguments) -> Result<Overrides, Finding> {
         calibration: arguments.calibration.clone(),
         engines: engine_names(ENGINES),
         missing_inertia: arguments.missing_inertia.clone(),
-        choose_entry: Some(EntryChooser(choose_entry)),
+        choose_entry: Some(EntryChooser(Arc::new(EntryFinder::default()))),
     })
 }
 
@@ -102,10 +101,10 @@ fn print_json(value: &impl Serialize) -> Result<()> {
     print_as_it_is(&printable_json(&document))
 }
 
-/// Licences of what the program is made of, in the crate's folder by a link.
+/// Third-party licences, linked into the crate's folder.
 const NOTICES: &str = include_str!("../../THIRD-PARTY-NOTICES");
 
-/// Prints the licences of what is inside the program.
+/// Prints the third-party licences.
 pub(crate) fn licences() -> Result<ExitStatus, Failure> {
     print_as_it_is(NOTICES.trim_end())?;
     Ok(ExitStatus::Success)

@@ -1,5 +1,7 @@
 //! `needlebench pairs`.
 
+mod srdf;
+
 use crate::arguments::RobotArguments;
 use clap::Args;
 use std::fmt::Write as _;
@@ -7,40 +9,42 @@ use std::path::Path;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use needlebench_cell::{Cell, ClearanceClass, Finding, Srdf, load_scenario};
+use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::{
-    PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
-    check_srdf, examine_pairs,
+    PairConcern, PairExamination, PairSettings, PairState, RangeBound, examine_pairs,
 };
+use needlebench_input::Finding;
+use needlebench_robot::Srdf;
+use needlebench_scenario::{ResolvedScenario, load_scenario};
 use serde::Serialize;
 
 use super::{overrides, print_json, print_text};
+use srdf::{SrdfAnswer, SrdfVerdict, check_srdf};
 
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
-use needlebench_report::plain_table;
 use needlebench_report::write_atomically;
+use needlebench_show::plain_table;
 use quick_xml::escape::escape;
 
 #[derive(Debug, Args)]
 pub(crate) struct PairsArguments {
-    /// Scenario whose cell is looked at.
+    /// Scenario with the cell to examine.
     #[arg(value_name = "SCENARIO")]
     pub scenario: PathBuf,
-    /// SRDF whose disabled pairs are checked against the model. needlebench measures every pair
-    /// that can move, whatever an SRDF says.
+    /// SRDF whose disabled pairs are checked against the model; needlebench itself measures every pair that can move.
     #[arg(long, value_name = "FILE")]
     pub srdf: Option<PathBuf>,
-    /// Write the arm's pairs that cannot collide as an SRDF.
+    /// Write the arm's pairs that cannot collide to an SRDF.
     #[arg(long, value_name = "FILE")]
     pub write_srdf: Option<PathBuf>,
-    /// Random postures that the collision rates are taken from.
+    /// Number of random postures for the collision rates.
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub samples: u32,
-    /// Boxes of joint positions after which the proof that a pair never touches gives up.
+    /// Limit of joint-position boxes for the proof that a pair never collides.
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
     pub proof_boxes: u32,
-    /// Seed of the postures.
+    /// Random seed of the postures.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub seed: u64,
     /// Print one JSON document.
@@ -101,10 +105,10 @@ struct SrdfPairAnswer {
     finding: Option<Finding>,
 }
 
-/// Prints every pair of bodies with what becomes of it and why, and checks an SRDF.
+/// Prints every pair of bodies with its state and the reason, and checks an SRDF.
 pub(crate) fn pairs(arguments: &PairsArguments) -> Result<ExitStatus, Failure> {
     let overrides = overrides(&arguments.robot)?;
-    // Unlike for a run, the start posture may collide: a wrong model is what is looked for.
+    // Unlike for a run, the start posture may collide: the command looks for errors of the model.
     let resolved = load_scenario(&arguments.scenario, &overrides)?;
     let srdf = arguments.srdf.as_deref().map(Srdf::load).transpose()?;
     let cell = &resolved.cell;
@@ -117,10 +121,10 @@ pub(crate) fn pairs(arguments: &PairsArguments) -> Result<ExitStatus, Failure> {
     let examined = examine_pairs(cell, &settings);
     let answers = srdf
         .as_ref()
-        .map(|srdf| check_srdf(srdf, cell, &examined))
+        .map(|srdf| check_srdf(srdf, cell, &resolved.robot_description.members, &examined))
         .unwrap_or_default();
     if let Some(path) = &arguments.write_srdf {
-        write_srdf(path, cell, &examined, &settings)?;
+        write_srdf(path, &resolved, &examined, &settings)?;
     }
     if arguments.json {
         print_json(&PairsAnswer {
@@ -181,11 +185,11 @@ fn table(cell: &Cell, examined: &[PairExamination], settings: &PairSettings) -> 
         "state",
         "joints",
         "in\ncollision",
-        "least seen\n(mm)",
-        "proven least\n(mm)",
+        "sampled min.\n(mm)",
+        "proven min.\n(mm)",
     ]);
     for pair in examined {
-        // What stands still in the world is no statement about the arm.
+        // Pairs fixed in the world say nothing about the arm.
         if pair.state == PairState::Fixed {
             continue;
         }
@@ -206,8 +210,8 @@ fn table(cell: &Cell, examined: &[PairExamination], settings: &PairSettings) -> 
     let mut text = String::new();
     let _ = write!(
         text,
-        "{} pairs measured, of which {} proven never to touch and {} always in collision; {} left \
-         out as adjacent, {} as fixed to each other ({} random postures, seed {})",
+        "{} pairs measured ({} proven never to collide, {} always in collision); {} excluded as adjacent, {} as \
+         fixed to each other ({} random postures, seed {})",
         examined
             .iter()
             .filter(|pair| pair.state.is_measured())
@@ -227,12 +231,12 @@ fn table(cell: &Cell, examined: &[PairExamination], settings: &PairSettings) -> 
         let _ = match concern {
             PairConcern::AlwaysInCollision => write!(
                 text,
-                "\nwarning: {a} and {b} overlap at every posture: no posture of this model is free"
+                "\nwarning: {a} and {b} collide in every posture: no posture of this model is collision-free"
             ),
             PairConcern::LeftOutButDependsOnPosture => write!(
                 text,
-                "\nwarning: {a} and {b} share a joint and are left out, but touch at {:.1} % of its \
-                 angles only: collisions of theirs go unseen",
+                "\nwarning: {a} and {b} share a joint and are excluded, but collide at only {:.1} % of its angles: \
+                 these collisions are not detected",
                 pair.collision_rate * 100.0
             ),
         };
@@ -293,27 +297,28 @@ fn srdf_text(srdf: &Srdf, cell: &Cell, answers: &[SrdfAnswer]) -> String {
             let [a, b] = &srdf.disabled[answer.pair].links;
             let _ = write!(
                 text,
-                "\nunproven: {a} and {b} touch at no posture seen, which proves nothing"
+                "\nunproven: {a} and {b} collide in no sampled posture, which is no proof"
             );
         }
     }
     text
 }
 
-/// Writes the arm's pairs that need no check: those that share a joint and those that are proven
-/// never to touch. What always collides stays enabled, because disabling it hides a wrong model.
+/// Writes the arm's pairs that need no check: those that share a joint and those that are proven never to collide.
+/// Pairs that always collide stay enabled, because disabling them hides an error of the model.
 fn write_srdf(
     path: &Path,
-    cell: &Cell,
+    resolved: &ResolvedScenario,
     examined: &[PairExamination],
     settings: &PairSettings,
 ) -> Result<()> {
+    let (cell, description) = (&resolved.cell, &resolved.robot_description);
     let robot = &cell.robot;
     let links_of = |body: usize| -> Vec<&str> {
         let name = &cell.bodies[body].name;
         let labels = std::iter::once(&robot.base).chain(&robot.links);
         let owner = labels.map(|link| &link.name).position(|each| each == name);
-        robot
+        description
             .members
             .iter()
             .filter(|member| Some(member.owner) == owner && member.has_geometry)
@@ -324,7 +329,7 @@ fn write_srdf(
         "<?xml version=\"1.0\"?>\n<!-- Pairs that cannot collide, derived by needlebench from {}.\n     \
          Adjacent: they share a joint. Never: proven over the whole joint ranges, to {} mm. -->\n\
          <robot name=\"{}\">\n",
-        escape(robot.source.file.replace("--", "-")),
+        escape(description.source.file.replace("--", "-")),
         settings.tolerance_m * 1e3,
         escape(&*robot.name),
     );

@@ -19,7 +19,7 @@ use needlebench_report::files::Folder;
 
 #[derive(Debug, Args)]
 pub(crate) struct PaperArguments {
-    /// Folder for `paper.json`, `paper.html` and the pictures.
+    /// Folder for `paper.json`, `paper.html` and the images.
     #[arg(long, value_name = "DIR", default_value = "out/paper")]
     pub out: PathBuf,
     /// Print the results as one JSON document instead of the tables.
@@ -27,12 +27,12 @@ pub(crate) struct PaperArguments {
     pub json: bool,
     #[command(flatten)]
     pub pictures: PicturesArguments,
-    /// Show no progress.
+    /// Do not show progress.
     #[arg(long)]
     pub quiet: bool,
 }
 
-/// Reproduces the paper, writes the results and prints them.
+/// Reproduces the paper, writes and prints the results.
 pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus, Failure> {
     let cancel = watch_interrupts()?;
     prepare_folder(&arguments.out)?;

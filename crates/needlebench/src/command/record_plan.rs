@@ -1,4 +1,4 @@
-//! `needlebench record-plan`.
+//! `needlebench plan-excitation`.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -7,20 +7,20 @@ use anyhow::{Context, Result};
 use clap::Args;
 use needlebench_bench::Runnable;
 use needlebench_bench::record_plan::PlanReport;
-use needlebench_cell::excitation::{ExcitationSection, FEWEST_POSTURES, Load, SweepSection};
-use needlebench_cell::scenario::PayloadSection;
-use needlebench_cell::{
-    ExcitationText, Finding, Overrides, pair_in_words, read_text, resolve_scenario,
-};
+use needlebench_cell::pair_in_words;
 use needlebench_clearance::ClearanceModel;
 use needlebench_evaluation::excitation::proven_m;
 use needlebench_export::excitation_script;
+use needlebench_input::{Finding, read_text};
 use needlebench_kinematics::{JOINT_LABELS, Joints};
 use needlebench_planning::excitation::{
     Aim, ExcitationPlan, FoundRun, SearchError, SearchOptions, search,
 };
 use needlebench_report::files::{Folder, write_plan};
 use needlebench_report::table::excitation::plan_text;
+use needlebench_scenario::excitation::{ExcitationSection, FEWEST_POSTURES, Load, SweepSection};
+use needlebench_scenario::scenario::PayloadSection;
+use needlebench_scenario::{ExcitationText, Overrides, resolve_scenario};
 
 use super::results_folder::prepare_folder;
 use super::{overrides, print_json, print_text};
@@ -29,31 +29,31 @@ use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::output::{complain, shown};
 
-/// Speeds of sweeps, deg/s: the section's defaults, where the arm may go as fast.
+/// Speeds of sweeps, deg/s: the section's defaults, if the arm permits them.
 const SWEEP_SPEEDS_DEG_S: [f64; 2] = [6.0, 40.0];
 
-/// Time between two rows of a simulated log, ms: 125 Hz, which every controller has.
+/// Time between two rows of a simulated log, ms: 125 Hz, which every controller supports.
 const PERIOD_MS: f64 = 8.0;
 
-/// Distance of a payload's centre from the axis of the last joint, mm: with 1 kg half a newton metre, several times what
-/// a current is uncertain by.
+/// Distance of a payload's centre from the axis of the last joint, mm: 0.5 N m with 1 kg, several times the uncertainty
+/// of a current.
 const BESIDE_AXIS_MM: f64 = 50.0;
 
-/// Searches with other seeds where what was found between looks turns out too near.
+/// Number of searches with other seeds if the run found is too close to something between samples.
 const ATTEMPTS: u64 = 5;
 
 #[derive(Debug, Args)]
 pub(crate) struct RecordPlanArguments {
-    /// Scenario in whose cell the arm moves; left out, the arm of --arm stands alone on a large bench.
+    /// Scenario with the cell [default: the arm of --arm alone on a large bench].
     #[arg(value_name = "SCENARIO", required_unless_present_any = ["arm", "robot"])]
     pub scenario: Option<PathBuf>,
-    /// Postures at which the arm stands.
+    /// Number of static postures.
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u16).range(1..=300))]
     pub poses: u16,
-    /// Seed of the search; the scenario's own if left out.
+    /// Random seed of the search [default: that of the scenario].
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// What is mounted besides the tool, kg: the run is made once with each.
+    /// Payloads mounted in addition to the tool, kg; the run is made once with each.
     #[arg(
         long,
         value_name = "KG[,KG]",
@@ -62,23 +62,23 @@ pub(crate) struct RecordPlanArguments {
         allow_negative_numbers = true
     )]
     pub payload_kg: Vec<f64>,
-    /// Centre of a payload in the flange frame, mm; left out, half of its depth before the flange and 50 mm
-    /// beside its axis, so that gravity loads the last joint too.
-    #[arg(long, value_name = "X,Y,Z", allow_negative_numbers = true)]
+    /// Centre of a payload in the flange frame, mm [default: half its depth in front of the flange and 50 mm off its axis,
+    /// so that gravity loads the last joint].
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub payload_centre_mm: Option<Three>,
-    /// Edges of the box around a payload, mm; left out, a cube of steel of its mass.
+    /// Edges of the box around a payload, mm [default: a steel cube of its mass].
     #[arg(long, value_name = "X,Y,Z")]
     pub payload_size_mm: Option<Three>,
-    /// Speed of the leading joint between postures, deg/s; every other motion has half of it.
+    /// Speed of the leading joint between postures, deg/s; every second motion has half of it.
     #[arg(long, value_name = "DEG_S", default_value_t = 60.0)]
     pub speed: f64,
-    /// Least proven clearance of arm, tool and payload from everything else, mm.
+    /// Required certified clearance of arm, tool and payload from everything else, mm.
     #[arg(long, value_name = "MM", default_value_t = 30.0)]
     pub clearance_mm: f64,
-    /// Least proven clearance of arm, tool and payload from the arm itself, mm.
+    /// Required certified self-clearance of arm, tool and payload, mm.
     #[arg(long, value_name = "MM", default_value_t = 5.0)]
     pub self_clearance_mm: f64,
-    /// Folder for results; the run gets a folder of the scenario's or the arm's name in it.
+    /// Folder for results; the run has a subfolder of the scenario's or arm's name.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
     /// Print one JSON document instead of the tables.
@@ -101,18 +101,18 @@ impl std::str::FromStr for Three {
             .map(|word| {
                 let number = word.trim().parse::<f64>().ok();
                 let finite = number.filter(|number| number.is_finite());
-                finite.ok_or_else(|| format!("`{}` is no number", word.trim()))
+                finite.ok_or_else(|| format!("`{}` is not a number", word.trim()))
             })
             .collect::<Result<_, _>>()?;
         let count = numbers.len();
         let three = numbers.try_into();
         three
             .map(Self)
-            .map_err(|_| format!("needs three numbers separated by commas, got {count}"))
+            .map_err(|_| format!("expected three comma-separated numbers, got {count}"))
     }
 }
 
-/// Finds a run, writes it as a scenario and as a program, and says what it keeps and what it tells.
+/// Plans a run, writes it as a scenario and as a program, and prints its clearances and predicted uncertainties.
 pub(crate) fn record_plan(arguments: &RecordPlanArguments) -> Result<ExitStatus, Failure> {
     let mut made = plan(arguments, &overrides(&arguments.robot)?)?;
     let folder = Folder(&made.folder);
@@ -133,7 +133,7 @@ pub(crate) fn record_plan(arguments: &RecordPlanArguments) -> Result<ExitStatus,
     Ok(ExitStatus::Success)
 }
 
-/// A run that is to be written.
+/// A run to write.
 struct Made {
     folder: PathBuf,
     report: PlanReport,
@@ -145,7 +145,7 @@ struct Made {
 fn plan(arguments: &RecordPlanArguments, overrides: &Overrides) -> Result<Made, Failure> {
     let wanted = wanted(arguments)?;
     let cell = cell_text(arguments, overrides)?;
-    // What replaces the robot stands in the text by now.
+    // The draft contains the overrides of the robot.
     let others = Overrides {
         robot_urdf: None,
         arm: None,
@@ -162,7 +162,7 @@ fn plan(arguments: &RecordPlanArguments, overrides: &Overrides) -> Result<Made, 
         ..wanted.clone()
     };
     let draft = cell.with(&name, "", "", None, &placeholder, &[]);
-    // Lines are those of the draft, which nobody has.
+    // Line numbers are those of the draft, which is not a file.
     let without_lines = |findings: Vec<Finding>| {
         findings
             .into_iter()
@@ -193,7 +193,7 @@ fn plan(arguments: &RecordPlanArguments, overrides: &Overrides) -> Result<Made, 
         let text = |head: &str, remarks: &[String]| {
             cell.with(
                 &format!("{name}_excitation"),
-                &format!("Excitation run in the cell of {name}, by needlebench record-plan."),
+                &format!("Excitation run in the cell of {name}, by needlebench plan-excitation."),
                 head,
                 Some(degrees(&resolved.start)),
                 &section,
@@ -229,7 +229,7 @@ fn plan(arguments: &RecordPlanArguments, overrides: &Overrides) -> Result<Made, 
     Err(Failure::BadInput(refused.into_iter().collect()))
 }
 
-/// The section but for its postures and sweeps.
+/// The section without postures and sweeps.
 fn wanted(arguments: &RecordPlanArguments) -> Result<ExcitationSection, Finding> {
     let refuse = |key: &str, message: String, hint: &str| {
         Err(Finding::new("the command line", message)
@@ -240,8 +240,8 @@ fn wanted(arguments: &RecordPlanArguments) -> Result<ExcitationSection, Finding>
     if poses < FEWEST_POSTURES {
         return refuse(
             "--poses",
-            format!("{poses} postures are too few, at least {FEWEST_POSTURES}"),
-            "a calibration has 30 unknowns, and of too few postures it makes an arm worse: 24 are sound",
+            format!("{poses} postures, at least {FEWEST_POSTURES} required"),
+            "a calibration has 30 unknowns and degrades the arm with too few postures: use 24",
         );
     }
     for (key, value, range) in [
@@ -264,7 +264,7 @@ fn wanted(arguments: &RecordPlanArguments) -> Result<ExcitationSection, Finding>
             return refuse(
                 "--payload-kg",
                 message,
-                "what is mounted besides the tool, kg",
+                "give the mass mounted in addition to the tool, kg",
             );
         }
         if arguments.payload_kg[..index].contains(mass) {
@@ -338,7 +338,7 @@ fn cell_text(
         .take(80)
         .collect();
     let name = if name.is_empty() { "arm" } else { &name };
-    // Nothing is known of what the arm stands on: a bench that reaches farther than the arm.
+    // The mounting surface is unknown: a bench larger than the reach of the arm.
     let text = format!(
         "name = \"{name}\"\nseed = 1\n\n[[obstacles]]\nname = \"bench_top\"\nclass = \"robot_mount\"\n\
          attached_to = \"robot_base\"\nposition_mm = [0, 0, -20]\n\
@@ -347,7 +347,7 @@ fn cell_text(
     ExcitationText::new("the command line", &text, Path::new(""), overrides)
 }
 
-/// A finding about a key of the run, said of the argument that it came from.
+/// A finding about a key of the run, assigned to the argument that set it.
 fn of_arguments(finding: Finding) -> Finding {
     let argument = match finding.key.as_deref() {
         Some(key) if key.contains(".size_mm") => "--payload-size-mm",
@@ -364,12 +364,12 @@ fn not_found(file: &str, error: &SearchError) -> Finding {
     let finding = Finding::new(file, error.to_string());
     match error {
         SearchError::Start { .. } => finding.key("start.joints_deg").hint(
-            "choose another start posture, under [start] of a scenario, or lower --clearance-mm or \
+            "choose another start posture under [start] of a scenario, or lower --clearance-mm or \
              --self-clearance-mm",
         ),
         SearchError::Postures { .. } => finding.key("--clearance-mm").hint(
-            "lower --clearance-mm, --self-clearance-mm or --poses, or choose a start posture with more room \
-             about it",
+            "lower --clearance-mm, --self-clearance-mm or --poses, or choose a start posture with more free \
+             space",
         ),
         SearchError::Sweep { .. } => finding
             .key("--clearance-mm")
@@ -402,15 +402,14 @@ fn degrees(q: &Joints) -> [f64; 6] {
 
 fn head(report: &PlanReport) -> String {
     let millimetres = |value: Option<f64>| {
-        value.map_or("nothing to come near to".to_owned(), |metres| {
+        value.map_or("nothing nearby".to_owned(), |metres| {
             format!("{:.1} mm", metres * 1e3)
         })
     };
     let [others, itself] = proven_m(&report.planned).map(millimetres);
     let mut text = format!(
-        "An excitation run for a {}, by needlebench record-plan with seed {}.\n\
-         Proven least clearance of arm, tool and payload: {others} from everything else, {itself} from \
-         itself.\n",
+        "An excitation run for a {}, by needlebench plan-excitation with seed {}.\n\
+         Certified clearance of arm, tool and payload: {others} from everything else, {itself} from itself.\n",
         report.arm, report.seed
     );
     for (class, found) in &report.planned.classes {
@@ -420,11 +419,11 @@ fn head(report: &PlanReport) -> String {
             let _ = writeln!(text, "  {class}: {proven} ({})", pair_in_words(&found.pair));
         }
     }
-    text.push_str("Beside each posture: proven clearances of the way to it, from everything else / itself, mm.\n\n");
+    text.push_str("Beside each posture: certified clearances of the motion to it, from everything else / itself, mm.\n\n");
     text
 }
 
-/// What the way to each posture keeps.
+/// The certified clearances of the motion to each posture.
 fn remarks(report: &PlanReport, plan: &ExcitationPlan) -> Vec<String> {
     let ways = plan.motions.iter().zip(&report.motions);
     ways.filter(|(motion, _)| matches!(motion.aim, Aim::Posture(_)))

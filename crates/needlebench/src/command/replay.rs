@@ -8,16 +8,17 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use needlebench_bench::RunOptions;
 use needlebench_bench::replay::{ReplayError, arm_files, named_by, replay as replay_run};
-use needlebench_cell::scenario::ReplaySection;
-use needlebench_cell::{
-    Arm, FileKind, Finding, LogColumns, Overrides, ResolvedScenario, load_scenario, or_wrong_kind,
-    resolve_scenario,
-};
+use needlebench_input::{FileKind, Finding, or_wrong_kind};
 use needlebench_recorded::{
     AngleUnit, EffortMeaning, ReadOptions, RecordedRun, TimeUnit, arm_fits, read_log,
 };
 use needlebench_report::files::{CALIBRATION_FILE, Folder, write_replay};
 use needlebench_report::table::replay::text;
+use needlebench_robot::Arm;
+use needlebench_scenario::scenario::ReplaySection;
+use needlebench_scenario::{
+    LogColumns, Overrides, ResolvedScenario, load_scenario, resolve_scenario,
+};
 
 use super::results_folder::ResultsFolder;
 use super::{overrides, print_json, print_text};
@@ -29,18 +30,17 @@ use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 
 pub(crate) const REPLAY_HELP: &str = "\
-The log is what UR's RTDE recorder or ur_rtde writes (timestamp, target_q_0 to _5, actual_q_0 ...; comma, \
-semicolon, tab or blanks between them), an MCAP file with sensor_msgs/JointState, or any table whose \
-columns --columns names:
+The log is a file of UR's RTDE recorder or of ur_rtde (timestamp, target_q_0 to _5, actual_q_0 ...; separated by \
+commas, semicolons, tabs or blanks), an MCAP file with sensor_msgs/JointState, or any table described by --columns:
 
   time = { column = \"t_ms\", unit = \"ms\" }
   actual_q = { columns = [\"q1\", \"q2\", \"q3\", \"q4\", \"q5\", \"q6\"], unit = \"deg\" }
   # target_q, target_qd, target_qdd, target_moment, target_current, actual_qd, actual_current,
   # actual_torque, tcp_position, tcp_rotation, payload, payload_cog, robot_mode likewise
 
-Units, clock, gaps, modes and the arm are checked; what is wrong or odd is said, and nothing is guessed. \
-The results are in OUT/NAME: replay.json, replay.txt, replay.html, junit.xml, a chart, the course of each \
-engine, and arm.toml with calibration.yaml, which scenarios use: [robot] arm = \"OUT/NAME/arm.toml\".
+Units, clock, gaps, modes and the arm are checked; errors and irregularities are reported, and nothing is guessed. \
+Results in OUT/NAME: replay.json, replay.txt, replay.html, junit.xml, a chart, the trajectory of each engine, and \
+arm.toml with calibration.yaml for scenarios: [robot] arm = \"OUT/NAME/arm.toml\".
 
 Example: needlebench replay models/ur3e/recorded/ur3e_rad_20211005.csv
 Example: needlebench replay log.csv --arm ur3e --max-tracking 0.5 --engine rapier
@@ -48,50 +48,49 @@ Example: needlebench replay run.mcap --arm ur5e --effort current";
 
 #[derive(Debug, Args)]
 pub(crate) struct ReplayArguments {
-    /// The recorded run: CSV or MCAP.
+    /// Log of the run: CSV or MCAP.
     #[arg(value_name = "LOG")]
     pub log: PathBuf,
-    /// Scenario whose cell, arm, engine settings and [replay] are used; the arm alone on its base if left
-    /// out.
+    /// Scenario with cell, arm, engine settings and [replay] [default: the arm alone on its base].
     #[arg(long, value_name = "SCENARIO")]
     pub scenario: Option<PathBuf>,
-    /// A table of columns: which column of the log is what, in which unit.
+    /// Description of the columns of the log, with their units.
     #[arg(long, value_name = "TOML")]
     pub columns: Option<PathBuf>,
-    /// What `effort` of joint states means; drivers of UR arms have had all three.
+    /// Meaning of `effort` in joint states; drivers of UR arms have used all three.
     #[arg(long, value_enum)]
     pub effort: Option<EffortArgument>,
-    /// Unit of the log's angles.
+    /// Unit of the angles.
     #[arg(long, value_enum, value_name = "UNIT")]
     pub angle_unit: Option<AngleArgument>,
-    /// Unit of the log's clock.
+    /// Unit of the clock.
     #[arg(long, value_enum, value_name = "UNIT")]
     pub time_unit: Option<TimeArgument>,
-    /// Column that is the clock.
+    /// Column with the clock.
     #[arg(long, value_name = "NAME", conflicts_with = "columns")]
     pub time_column: Option<String>,
-    /// Rows per second, in place of the log's clock.
+    /// Rows per second, instead of the log's clock.
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub rate: Option<f64>,
     /// Topic of the joint states in an MCAP file.
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
-    /// Engines; those that run by default, or the scenario's choice, if left out.
+    /// Physics engines [default: those of the scenario, or all default engines].
     #[arg(long, value_name = "ENGINE[,ENGINE]", value_parser = EngineParser)]
     pub engine: Option<EngineArgument>,
-    /// Largest rms that the identified arm may leave of a joint's target_moment, held out, N m.
+    /// Limit of the RMS residual of a joint's target_moment on held-out data, N m.
     #[arg(long, value_name = "NM", value_parser = not_negative)]
     pub max_moment_rms: Option<f64>,
-    /// Largest distance of the simulated tip from the real one, mm.
+    /// Limit of the distance between simulated and real tip, mm.
     #[arg(long, value_name = "MM", value_parser = not_negative)]
     pub max_tracking: Option<f64>,
-    /// Largest rms of a joint's simulated less its measured current, A.
+    /// Limit of the RMS difference between simulated and measured current of a joint, A.
     #[arg(long, value_name = "A", value_parser = not_negative)]
     pub max_current_rms: Option<f64>,
-    /// Largest rms error of the calibration on poses that it has not seen, mm.
+    /// Limit of the RMS error of the calibration on held-out poses, mm.
     #[arg(long, value_name = "MM", value_parser = not_negative)]
     pub max_calibration: Option<f64>,
-    /// Folder for results; the log gets a folder of its name in it.
+    /// Folder for results; the log has a subfolder of its name.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
     /// Print one JSON document instead of the tables.
@@ -99,24 +98,24 @@ pub(crate) struct ReplayArguments {
     pub json: bool,
     #[command(flatten)]
     pub pictures: PicturesArguments,
-    /// Write no page.
+    /// Do not write the page.
     #[arg(long)]
     pub no_page: bool,
-    /// No progress.
+    /// Do not show progress.
     #[arg(long)]
     pub quiet: bool,
     #[command(flatten)]
     pub robot: RobotArguments,
 }
 
-/// What `effort` means.
+/// Meaning of `effort`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum EffortArgument {
     /// Motor currents, A.
     Current,
     /// Torques at the joints, N m.
     Torque,
-    /// Torques without the share that holds arm and load against gravity, N m.
+    /// Torques at the joints, compensated for gravity of arm and load, N m.
     Compensated,
 }
 
@@ -156,7 +155,7 @@ fn not_negative(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Reads a log, says what it shows of the arm, and replays it.
+/// Reads a log, identifies the arm from it, and replays it.
 pub(crate) fn replay(arguments: &ReplayArguments) -> Result<ExitStatus, Failure> {
     let (run, resolved, found, folder) = prepared(arguments)?;
     replayed(arguments, run, &resolved, &found, &folder)
@@ -191,7 +190,7 @@ fn prepared(arguments: &ReplayArguments) -> Result<Prepared, Failure> {
             .transpose()?,
     };
     let overrides = overrides(&arguments.robot)?;
-    // What is wrong with the scenario is found before a long log is read.
+    // Errors of the scenario are found before a long log is read.
     let of_scenario = match &arguments.scenario {
         Some(path) => Some(load_scenario(path, &overrides)?),
         None => None,
@@ -238,19 +237,18 @@ fn arm_alone(
         let Some(name) = named_by(run) else {
             if let Some(best) = arm_fits(run).first() {
                 let message = format!(
-                    "the log's poses are those of no known arm: those of the {}, which fit best, are off by \
-                     {:.1} mm rms",
+                    "the log's poses match no known arm: the best fit, {}, has an error of {:.1} mm RMS",
                     best.arm,
                     best.rms_m * 1e3
                 );
-                let hint = "are angles and positions in the units that they seem to be (--angle-unit), \
-                            and did the tool's point stay the same?";
+                let hint = "check the units of angles and positions (--angle-unit), and whether the tool centre \
+                            point was constant";
                 return refuse(message, hint.to_owned());
             }
             return refuse(
-                "the log does not say which arm it is of".to_owned(),
+                "the log does not identify its arm".to_owned(),
                 format!(
-                    "name it: --arm {}; a log with actual_TCP_pose says it by itself",
+                    "name it: --arm {}; a log with actual_TCP_pose identifies it",
                     names.join(", --arm ")
                 ),
             );
@@ -258,19 +256,19 @@ fn arm_alone(
         let key = name.to_lowercase();
         if !names.contains(&key.as_str()) {
             return refuse(
-                format!("the log is of a {name}, of which no data ship"),
+                format!("the log is of a {name}, for which there are no bundled data"),
                 "give its URDF: --robot URDF, or its data: --arm my_arm.toml".to_owned(),
             );
         }
         found = "by the poses in the log";
         overrides.arm = Some(key);
     }
-    // A goal that nothing is planned for: a replay has none.
+    // A placeholder: a replay has no goal.
     let text = "name = \"replay\"\n[[goals]]\nname = \"none\"\ninsertion_length_mm = 100\n\
                 [goals.flange_pose]\nposition_mm = [200, -300, 200]\nrotation_vector_rad = [0, 3.14, 0]\n\
                 [robot]\nbase_position_mm = [0, 0, 1000]\nbase_rpy_deg = [0, 0, 0]\n";
     let mut resolved = resolve_scenario("the arm alone", text, Path::new(""), &overrides)?;
-    // Of the stand-in only what is of the arm is worth saying.
+    // Only notes about the arm apply.
     resolved
         .notes
         .retain(|note| note.starts_with("arm data") || note.contains("servo of"));
@@ -311,7 +309,7 @@ fn replayed(
     let done = replay_run(run, resolved, found, &criteria, &engines, &control);
     progress.finish();
     let done = done.map_err(|ReplayError::Arm(finding)| *finding)?;
-    let arm = arm_files(&done.report, &resolved.cell.robot, CALIBRATION_FILE);
+    let arm = arm_files(&done.report, &resolved.robot_description, CALIBRATION_FILE);
     write_replay(
         &done,
         arm.as_ref(),
@@ -333,7 +331,7 @@ fn replayed(
         ))?;
     }
     if done.interrupted {
-        complain("interrupted: what was finished is written");
+        complain("interrupted: completed results are written");
         return Ok(ExitStatus::Interrupted);
     }
     let failed = !done.report.engine_failures.is_empty();

@@ -4,9 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use needlebench_bench::credibility::Credibility;
-use needlebench_cell::judgement::Judgement;
-use needlebench_report::credibility::credibility_markdown;
+use needlebench_credibility::{Credibility, Judgement, credibility_markdown};
 use needlebench_report::files::Folder;
 
 use super::results_folder::prepare_folder;
@@ -16,28 +14,28 @@ use crate::failure::Failure;
 use crate::output::shown;
 
 pub(crate) const REPORT_HELP: &str = "\
-Collects what folders of results know - versions, hashes of inputs, tests against closed forms, the engines' \
-difference, halved time steps, criteria, assumptions, held-out errors against a recorded run - and what people \
-state in a TOML file, in the frame of ASME V&V 40. It claims no conformity.
+Collects evidence from folders of results - versions, hashes of inputs, tests against closed forms, the engines' \
+difference, halved time steps, criteria, assumptions, held-out errors relative to a recorded run - and the statements \
+in a TOML file, in the framework of ASME V&V 40. It claims no conformity.
 
 Example: needlebench report out/table3 --credibility --judgement judgement.toml
 Example: needlebench report --template > judgement.toml";
 
 #[derive(Debug, Args)]
 pub(crate) struct ReportArguments {
-    /// Folders of results of `run` or `replay`, such as out/table3.
+    /// Folders of results of `run` or `replay`, e.g. out/table3.
     #[arg(required_unless_present = "template", value_name = "RESULTS_FOLDER")]
     pub folders: Vec<PathBuf>,
-    /// Evidence for the credibility of the results: credibility.md and credibility.json.
+    /// Write the evidence for the credibility of the results: credibility.md and credibility.json.
     #[arg(long, required_unless_present = "template")]
     pub credibility: bool,
-    /// What people state: question, context of use, risk, applicability, limitations.
+    /// File with the assessments by people: question, context of use, risk, applicability, limitations.
     #[arg(long, value_name = "FILE")]
     pub judgement: Option<PathBuf>,
     /// Print an empty file for --judgement.
     #[arg(long, conflicts_with_all = ["folders", "credibility", "judgement", "out", "json"])]
     pub template: bool,
-    /// Folder for the documents; that of the first results if left out.
+    /// Folder for the documents [default: that of the first results].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print the JSON document instead of the Markdown.
@@ -45,7 +43,7 @@ pub(crate) struct ReportArguments {
     pub json: bool,
 }
 
-/// Collects evidence, writes and prints it.
+/// Collects, writes and prints the evidence.
 pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitStatus, Failure> {
     if arguments.template {
         print_as_it_is(Judgement::template().trim_end())?;

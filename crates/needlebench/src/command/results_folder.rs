@@ -1,34 +1,33 @@
-//! Folders of results: made, proven to be writable, and of one writer at a time.
+//! Folders of results: created, checked to be writable, and locked for one writer at a time.
 
 use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::path::Path;
 
-use needlebench_cell::Finding;
 use needlebench_imaging::write::TEMPORARY_PREFIX;
+use needlebench_input::Finding;
 
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
 
-/// How often and after how long a folder in use is looked at again: what has just ended may still hold it.
+/// Number of and time between attempts to lock a folder: a process that has just ended may still hold the lock.
 const LOOKS: u32 = 10;
 const LOOK: std::time::Duration = std::time::Duration::from_millis(50);
 
-/// Deepest folder within a folder of results in which files are left over: `ct/surfaces`.
+/// Depth of subfolders in which unfinished files are removed: `ct/surfaces`.
 const DEEPEST: u32 = 2;
 
-/// A folder that this process alone writes results into, for as long as it has this. The system lets go of it however the
-/// program ends; nothing is left in the folder.
+/// An exclusive lock on a folder of results. The system releases it however the program ends; no file is left in the
+/// folder.
 #[derive(Debug)]
 #[must_use = "others may write into the folder once it is dropped"]
 pub(crate) struct ResultsFolder {
-    /// None where folders cannot be locked.
+    /// None if folders cannot be locked.
     _lock: Option<File>,
 }
 
 impl ResultsFolder {
-    /// Makes a folder, proves that it can be written, keeps other writers out, and removes what killed ones have left of
-    /// files that they had not finished.
+    /// Creates a folder, checks that it can be written, locks it, and removes unfinished files of killed processes.
     ///
     /// # Errors
     /// It cannot be made or written; another process writes into it.
@@ -41,7 +40,7 @@ impl ResultsFolder {
         Ok(taken)
     }
 
-    /// The same of a folder for what is known of a patient: one that is made is its owner's alone.
+    /// The same for patient data: a new folder is accessible to its owner only.
     ///
     /// # Errors
     /// As [`ResultsFolder::take`].
@@ -51,7 +50,7 @@ impl ResultsFolder {
     }
 }
 
-/// The lock is the system's on the folder itself. Where it has none for folders, there is none.
+/// Locks the folder itself with the system's lock, if it supports folders.
 fn lock(folder: &Path) -> Result<Option<File>, Failure> {
     let Ok(file) = File::open(folder) else {
         return Ok(None);
@@ -72,7 +71,7 @@ fn lock(folder: &Path) -> Result<Option<File>, Failure> {
     })
 }
 
-/// Removes files that were not finished; what cannot be removed stays.
+/// Removes unfinished files, as far as possible.
 fn clear(folder: &Path, depth: u32) {
     for entry in folder.read_dir().into_iter().flatten().flatten() {
         let name = entry.file_name();
@@ -91,10 +90,10 @@ fn clear(folder: &Path, depth: u32) {
     }
 }
 
-/// Makes a folder and proves that it can be written.
+/// Creates a folder and checks that it can be written.
 ///
 /// # Errors
-/// The folder cannot be one; the disk is full or away, which passes.
+/// The folder cannot be created; the disk is full or unavailable, which is temporary.
 pub(crate) fn prepare_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .and_then(|()| probe_folder(folder))
@@ -113,7 +112,7 @@ pub(crate) fn prepare_folder(folder: &Path) -> Result<(), Failure> {
                 return Failure::Ended {
                     status: ExitStatus::EnvironmentFailed,
                     message: format!(
-                        "error: {}: {message}\nhint: make room, or choose another folder with --out DIR",
+                        "error: {}: {message}\nhint: free disk space, or choose another folder with --out DIR",
                         folder.display()
                     ),
                 };
@@ -129,7 +128,7 @@ fn make_private(folder: &Path) {
     #[cfg(unix)]
     if !folder.exists() {
         use std::os::unix::fs::DirBuilderExt;
-        // What keeps it from being made is said later.
+        // An error is reported later.
         let _ = folder.parent().map_or(Ok(()), std::fs::create_dir_all);
         let _ = std::fs::DirBuilder::new().mode(0o700).create(folder);
     }
@@ -137,7 +136,7 @@ fn make_private(folder: &Path) {
     let _ = folder;
 }
 
-/// Proves that a file that an argument names can be written, before a long run.
+/// Checks that a file named by an argument can be written, before a long run.
 ///
 /// # Errors
 /// It cannot.
@@ -157,7 +156,7 @@ pub(crate) fn probe_file(path: &Path, argument: &str) -> Result<(), Finding> {
             format!("the file cannot be written: {error}"),
         )
         .key(argument)
-        .hint("choose a file in a folder that exists and can be written")
+        .hint("choose a file in an existing, writable folder")
     })
 }
 

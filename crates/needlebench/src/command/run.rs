@@ -11,9 +11,15 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
-use needlebench_cell::{Finding, Overrides};
+use needlebench_bench::accuracy::{accuracy_of_run, check_run};
+use needlebench_bench::ct::{BuildFiles, imaged};
+use needlebench_bench::{Control, RunOptions, Runnable, ScenarioRun, Stop};
 use needlebench_engine::ENGINES;
 use needlebench_evaluation::report::Report;
+use needlebench_input::Finding;
+use needlebench_report::files::{Folder, RunFiles, write_run};
+use needlebench_report::{junit, markdown, report_screen, report_text, write_atomically};
+use needlebench_scenario::Overrides;
 use serde::Serialize;
 
 use super::results_folder::{ResultsFolder, prepare_folder, probe_file};
@@ -22,12 +28,6 @@ use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
 use crate::progress::TerminalProgress;
-use needlebench_bench::Stop;
-use needlebench_bench::accuracy::{accuracy_of_run, check_run};
-use needlebench_bench::ct::{BuildFiles, imaged};
-use needlebench_bench::{Control, RunOptions, Runnable, ScenarioRun};
-use needlebench_report::files::{Folder, RunFiles, write_run};
-use needlebench_report::{junit, markdown, report_screen, report_text, write_atomically};
 
 #[derive(Debug, Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
@@ -35,41 +35,39 @@ pub(crate) struct RunArguments {
     /// Scenario files.
     #[arg(required = true, value_name = "SCENARIO")]
     pub scenarios: Vec<PathBuf>,
-    /// Engines, instead of the scenario's own choice.
+    /// Physics engines [default: those of the scenario].
     #[arg(long, value_name = "ENGINE[,ENGINE]", value_parser = EngineParser)]
     pub engine: Option<EngineArgument>,
-    /// Hold every simulated motion against the referee, our own dynamics integrated to rounding, at
-    /// the scenario's time step, its half and its quarter; three to ten times as long.
-    #[arg(long)]
+    /// Verify every motion against the reference integrator at steps h, h/2 and h/4 (3 to 10 times slower).
+    #[arg(long = "reference", alias = "referee")]
     pub referee: bool,
-    /// Folder for results; each scenario gets a folder of its name in it.
+    /// Folder for results; each scenario has a subfolder of its name.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
     /// Print the report as one JSON document instead of the table.
     #[arg(long)]
     pub json: bool,
-    /// Write JUnit XML of all scenarios to this file besides the one in the results folder.
+    /// Also write JUnit XML of all scenarios to this file.
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
-    /// Threads; the number of cores if left out. Results do not depend on it.
+    /// Number of threads [default: all cores]; does not affect results.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: Option<u16>,
-    /// Write a log of each motion by the names of UR's real-time data exchange too, as its recorder
-    /// would write it of the real arm.
+    /// Also write each motion as an RTDE log, in the format of the UR recorder.
     #[arg(long)]
     pub rtde: bool,
-    /// Write each recorded motion in another format too, beside its CSV.
+    /// Also write each recorded motion in another format, beside its CSV.
     #[arg(long, value_name = "FORMAT", value_enum)]
     pub record: Option<Record>,
     #[command(flatten)]
     pub pictures: PicturesArguments,
-    /// Write no report page.
+    /// Do not write the report page.
     #[arg(long)]
     pub no_page: bool,
-    /// Show no progress.
+    /// Do not show progress.
     #[arg(long)]
     pub quiet: bool,
-    /// Print all tables, as wide as they are, instead of one screen.
+    /// Print all tables at full width instead of one screen.
     #[arg(long, conflicts_with = "json")]
     pub wide: bool,
     #[command(flatten)]
@@ -81,7 +79,7 @@ pub(crate) struct RunArguments {
 /// Format of recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Record {
-    /// Messages of ROS 2 in an MCAP file for each goal, configuration and engine.
+    /// ROS 2 messages in an MCAP file for each goal, configuration and engine.
     Mcap,
 }
 
@@ -91,7 +89,7 @@ struct SeveralReports<'a> {
     results: &'a [Report],
 }
 
-/// Runs scenarios, writes their results and prints them.
+/// Runs scenarios, writes and prints their results.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
     if arguments.wide {
         print_wide();
@@ -169,7 +167,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
         let runnable = scanned.as_ref().unwrap_or(scenario);
         let (outcome, report) = run_into(runnable, &options, folder, outputs, &cancel)?;
         status = status.max(outcome);
-        // What was interrupted is no sample of anything.
+        // An interrupted run is not a sample of anything.
         if let Some(request) = table
             .as_ref()
             .filter(|_| outcome != ExitStatus::Interrupted)
@@ -201,7 +199,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
     Ok(status)
 }
 
-/// How a scan is made.
+/// How a scan is computed.
 struct Scan<'s> {
     /// The scenario's results folder.
     folder: &'s Path,
@@ -210,7 +208,7 @@ struct Scan<'s> {
     quiet: bool,
 }
 
-/// The scenario of what is seen in the scan that a scenario begins with; none if it begins with none.
+/// The scenario built from a scenario's scan; none if it has no section `[ct]`.
 fn scanned(
     scenario: &Runnable,
     scan: &Scan<'_>,
@@ -245,26 +243,23 @@ fn scanned(
         runnable.map_err(|finding| Stop::Refused(vec![finding]))
     });
     checked.map(Some).map_err(|stop| {
-        Failure::of_stop(
-            stop,
-            "interrupted while the scan was made: there are no results",
-        )
+        Failure::of_stop(stop, "interrupted while the scan was computed: no results")
     })
 }
 
-/// What a run leaves besides its report.
+/// What a run writes besides its report.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(super) struct Outputs {
-    /// Logs as a controller writes them, whatever the scenario wants.
+    /// RTDE logs, whatever the scenario's own setting.
     pub rtde: bool,
-    /// Recordings as messages of ROS 2.
+    /// Recordings as ROS 2 messages.
     pub mcap: bool,
-    /// Pictures, if the scenario wants any.
+    /// Images, if the scenario has any.
     pub pictures: bool,
     /// The page.
     pub page: bool,
-    /// What is on standard output.
+    /// What is printed to standard output.
     pub text: Printed,
     /// No progress.
     pub quiet: bool,
@@ -281,7 +276,7 @@ pub(super) enum Printed {
     All,
 }
 
-/// Runs one scenario and writes its results into a folder that is there.
+/// Runs one scenario and writes its results into an existing folder.
 pub(super) fn run_into(
     runnable: &Runnable,
     options: &RunOptions,
@@ -290,8 +285,8 @@ pub(super) fn run_into(
     cancel: &AtomicBool,
 ) -> Result<(ExitStatus, Report)> {
     let progress = TerminalProgress::new(outputs.quiet);
-    // A robot that is not a UR arm was refused while the scenario was read.
-    let mut finished = needlebench_bench::run(runnable, options, cancel, &progress)?;
+    // A robot that is not a UR arm was rejected while the scenario was read.
+    let finished = needlebench_bench::run(runnable, options, cancel, &progress)?;
     let resolved = runnable.scenario();
     let files = RunFiles {
         rtde: outputs.rtde,
@@ -302,33 +297,34 @@ pub(super) fn run_into(
         cancel,
         engines: ENGINES,
     };
-    let written = write_run(resolved, &mut finished, Folder(folder), files, &progress);
+    let written = write_run(resolved, &finished, Folder(folder), files, &progress);
     progress.finish();
-    written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
+    let report =
+        written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
     match outputs.text {
         Printed::Nothing => {}
         Printed::Screen => {
-            let text = report_screen(&finished.report, ENGINES);
-            let page = if outputs.page {
-                ", to look at: report.html"
+            let text = report_screen(&report, ENGINES);
+            let results = if outputs.page {
+                shown(&folder.join("report.html"))
             } else {
-                ""
+                shown(folder)
             };
-            print_text(&format!("{text}results: {}{page}", shown(folder)))?;
+            print_text(&format!("{text}results: {results}"))?;
         }
         Printed::All => {
             let name = &resolved.scenario.name;
-            let text = report_text(&finished.report, ENGINES);
+            let text = report_text(&report, ENGINES);
             print_text(&format!("{name}\n{text}results: {}", shown(folder)))?;
         }
     }
     if finished.interrupted {
         complain(&format!(
-            "interrupted: what was finished until then is in {}",
+            "interrupted: completed results are in {}",
             shown(folder)
         ));
     }
-    Ok((outcome(&finished), finished.report))
+    Ok((outcome(&finished), report))
 }
 
 fn outcome(finished: &ScenarioRun) -> ExitStatus {
@@ -350,15 +346,15 @@ fn repeated_name(scenarios: &[Runnable]) -> Option<Finding> {
         Some(
             Finding::new(
                 &each.source.file,
-                format!("`{name}` is the name of {} too", earlier.source.file),
+                format!("{} has the same name, `{name}`", earlier.source.file),
             )
             .key("name")
-            .hint("the name is that of the results folder: give each scenario its own"),
+            .hint("the results folder has this name: give each scenario a unique name"),
         )
     })
 }
 
-/// Takes each scenario's results folder before a long run.
+/// Locks each scenario's results folder before a long run.
 fn take_folders(
     arguments: &RunArguments,
     scenarios: &[Runnable],

@@ -11,25 +11,25 @@ use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::output::print_text;
 
-/// What can be described.
+/// The formats with a schema.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SchemaFormat {
     /// Scenario files.
     Scenario,
     /// Study files.
     Study,
-    /// An arm's data, `arm.toml`.
+    /// Arm data files, `arm.toml`.
     Arm,
-    /// The metrics: no file, but the names and definitions of the numbers in reports and studies.
+    /// Metrics: names and definitions of the values in reports and studies.
     Metrics,
 }
 
-/// Version of the schemas. It rises when a file that was right would not be any more, or would mean something
-/// else; what is only added leaves it. `tests/schema/released` has the schema of each version.
+/// Version of the schemas. It rises if a valid file becomes invalid or changes its meaning; additions do not change it.
+/// `tests/schema/released` has the schema of each version.
 pub(crate) const SCHEMA_VERSION: u32 = 1;
 
 impl SchemaFormat {
-    /// Name in the command line and in the schema's own identifier.
+    /// Name in the command line and in the schema's identifier.
     fn name(self) -> &'static str {
         match self {
             Self::Scenario => "scenario",
@@ -49,7 +49,7 @@ impl SchemaFormat {
     }
 }
 
-/// Prints what is asked for, as JSON or as Markdown.
+/// Prints a schema as JSON or Markdown.
 pub(crate) fn schema(format: SchemaFormat, markdown: bool) -> Result<ExitStatus, Failure> {
     if !markdown {
         print_json(&document(format))?;
@@ -61,24 +61,24 @@ pub(crate) fn schema(format: SchemaFormat, markdown: bool) -> Result<ExitStatus,
     Ok(ExitStatus::Success)
 }
 
-/// The schema of a format; of metrics their descriptions.
+/// The schema of a format, or the descriptions of the metrics.
 pub(super) fn document(format: SchemaFormat) -> Value {
     let mut schema = match format {
-        SchemaFormat::Scenario => needlebench_cell::scenario::scenario_schema(),
-        SchemaFormat::Study => needlebench_cell::study::study_schema(),
-        SchemaFormat::Arm => needlebench_cell::arm::data::arm_schema(),
+        SchemaFormat::Scenario => needlebench_scenario::scenario::scenario_schema(),
+        SchemaFormat::Study => needlebench_scenario::study::study_schema(),
+        SchemaFormat::Arm => needlebench_robot::arm::data::arm_schema(),
         SchemaFormat::Metrics => {
             return json!({ "schema_version": 1, "metrics": metric_descriptions() });
         }
     };
     name_engines(&mut schema, ENGINES);
-    // A name, not a place: nobody has to be asked for it.
+    // A name, not a location: no request is necessary.
     let name = format.name();
     schema["$id"] = json!(format!("urn:needlebench:schema:{name}:{SCHEMA_VERSION}"));
     schema
 }
 
-/// Adds the engines' names where a file may name some, and those that run where it names none.
+/// Adds the names of the engines, and the default ones.
 fn name_engines(schema: &mut Value, engines: &[&'static dyn Engine]) {
     if let Some(name) = schema.pointer_mut("/definitions/EngineName") {
         name["enum"] = json!(engine_names(engines));

@@ -5,7 +5,10 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use needlebench_cell::study::load_study;
+use needlebench_bench::progress::Progress as _;
+use needlebench_bench::search::{GenerationEvaluator, PreparedSearch, out_of_reach, worth_of};
+use needlebench_report::files::{FilesError, SearchDocument, write_search, write_search_log};
+use needlebench_scenario::study::load_study;
 use needlebench_study::search::{
     Answer, CaseWorth, Generation, GenerationDesign, Judge, SearchError, SearchLog,
     search as search_for,
@@ -24,17 +27,15 @@ use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
 use crate::output::shown;
 use crate::progress::TerminalProgress;
-use needlebench_bench::progress::Progress as _;
-use needlebench_bench::search::{GenerationEvaluator, PreparedSearch, out_of_reach, worth_of};
-use needlebench_report::files::{FilesError, SearchDocument, write_search, write_search_log};
 
 pub(crate) const SEARCH_HELP: &str = "\
-Factors with `role = \"choice\"` are searched, all others are what a choice has to hold for. [search] in the study's \
-file says by what: a lower quantile of the margin, the share of layouts that work, or the expected error of the tip.
+Control factors (`role = \"choice\"`) are optimised; noise factors define the layouts that every candidate is evaluated \
+on. [search] in the study file selects the objective: a lower quantile of the constraint margin, the share of feasible layouts, or \
+the RMS tip error.
 
-Writes DIR/NAME/search.json, search.html and a folder for each generation, DIR/NAME/search/gen_000 and so on, which is a \
-study of its own. An interrupted search goes on with --resume. With --shard K/N a process computes its part of the generation that \
-is next and ends; a search without --shard joins parts that are all there and goes on.
+Writes DIR/NAME/search.json, search.html and a folder for each generation, DIR/NAME/search/gen_000 and so on, each a \
+complete study. --resume continues an interrupted search. With --shard K/N a process computes its part of the next \
+generation and ends; a search without --shard joins complete parts and continues.
 
 Example: needlebench search scenarios/studies/search_base.toml
 Example: needlebench search scenarios/studies/tools.toml --json";
@@ -49,40 +50,40 @@ pub(crate) struct SearchArguments {
     /// Study file.
     #[arg(value_name = "STUDY")]
     pub study: PathBuf,
-    /// Folder for results; the study gets a folder of its name in it.
+    /// Folder for results; the study has a subfolder of its name.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
-    /// Go on with a search that was interrupted.
+    /// Continue an interrupted search.
     #[arg(long)]
     pub resume: bool,
-    /// Compute one of N parts of the next generation and end: 1/N to N/N; `auto` takes it from the scheduler's
+    /// Compute one of N parts of the next generation and end: 1/N to N/N, or `auto` to read it from the scheduler's
     /// environment.
     #[arg(long, value_name = "K/N|auto")]
     pub shard: Option<ShardArgument>,
-    /// Print one JSON document instead of the answer for people.
+    /// Print one JSON document instead of the tables.
     #[arg(long)]
     pub json: bool,
-    /// Threads; the number of cores if left out. Results do not depend on it.
+    /// Number of threads [default: all cores]; does not affect results.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: Option<u16>,
-    /// Write no page.
+    /// Do not write the page.
     #[arg(long)]
     pub no_page: bool,
-    /// Show no progress.
+    /// Do not show progress.
     #[arg(long)]
     pub quiet: bool,
     #[command(flatten)]
     pub robot: RobotArguments,
 }
 
-/// Searches the choices of a study.
+/// Optimises the control factors of a study.
 pub(crate) fn search(arguments: &SearchArguments) -> Result<ExitStatus, Failure> {
     let overrides = overrides(&arguments.robot)?;
     let prepared = PreparedSearch::new(load_study(&arguments.study, &overrides)?)?;
     let folder = arguments.out.join(&prepared.study.file.name);
     prepare_folder(&folder)?;
     let generations = folder.join(GENERATIONS);
-    // A shard is asked for again and again, one generation after the other.
+    // Shards are started again for each generation.
     if generations.exists() && !arguments.resume && arguments.shard.is_none() {
         return Err(Failure::from(StudyError::Exists {
             folder: generations,
@@ -124,7 +125,7 @@ pub(crate) fn search(arguments: &SearchArguments) -> Result<ExitStatus, Failure>
     })
 }
 
-/// Computes generations as studies, each in a folder of its own.
+/// Computes generations as studies, each in its own folder.
 struct GenerationJudge<'a> {
     search: &'a PreparedSearch,
     folder: &'a Path,
@@ -136,10 +137,10 @@ struct GenerationJudge<'a> {
     has_computed: bool,
 }
 
-/// Why a search ends early.
+/// Reasons to end a search early.
 enum Stop {
     Interrupted,
-    /// A part of a generation is there.
+    /// A part of a generation is complete.
     Part {
         generation: u32,
         shard: Shard,
@@ -159,7 +160,7 @@ impl Stop {
     fn status(self, folder: &Path) -> Result<ExitStatus, Failure> {
         match self {
             Self::Interrupted => Err(Failure::interrupted(format!(
-                "interrupted: what is done is in {}; --resume goes on",
+                "interrupted: completed generations are in {}; --resume continues",
                 shown(folder)
             ))),
             Self::Part {
@@ -169,15 +170,15 @@ impl Stop {
                 folder,
             } => {
                 print_text(&format!(
-                    "{cases} cases of generation {generation}, part {shard}, are in {}; once all parts are \
-                     there, `needlebench search --resume` joins them and goes on",
+                    "{cases} cases of generation {generation}, part {shard}, are in {}; once all parts are complete, \
+                     `needlebench search --resume` joins them and continues",
                     shown(&folder)
                 ))?;
                 Ok(ExitStatus::Success)
             }
             Self::NoPart { generation, parts } => {
                 print_text(&format!(
-                    "generation {generation} is so small that it has {parts} parts: nothing to do for this one"
+                    "generation {generation} has only {parts} parts: nothing to do for this one"
                 ))?;
                 Ok(ExitStatus::Success)
             }
@@ -235,7 +236,7 @@ impl GenerationJudge<'_> {
         }
     }
 
-    /// Joins the parts of a generation if all are there.
+    /// Joins the parts of a generation if all are complete.
     fn join(&self, generation: &Generation) -> Result<(), Stop> {
         let Some(parts) = self.complete_parts(generation)? else {
             return Ok(());
@@ -248,7 +249,7 @@ impl GenerationJudge<'_> {
         Ok(())
     }
 
-    /// Folders of all parts of a generation; none unless all are there.
+    /// Folders of all parts of a generation; none unless all are complete.
     fn complete_parts(&self, generation: &Generation) -> Result<Option<Vec<PathBuf>>, Stop> {
         let prefix = format!("gen_{:03}.part_", generation.number);
         let Ok(entries) = self.generations.read_dir() else {
@@ -322,7 +323,7 @@ impl Judge for GenerationJudge<'_> {
             self.join(generation)?;
             self.has_computed = true;
         }
-        // Of a complete one this checks that it is of this search, and sound.
+        // For a complete one this checks that it belongs to this search and is intact.
         self.compute(generation, None)?;
         let table = self.path(number).join(needlebench_study::RESULTS_FILE);
         let results = ParquetResults::open(&table).map_err(StudyError::from)?;
@@ -343,7 +344,7 @@ impl Judge for GenerationJudge<'_> {
     }
 
     fn note(&mut self, log: &SearchLog) -> Result<(), Stop> {
-        // What is only read again stands in the file already, perhaps with its answer.
+        // Generations read again are in the file already, perhaps with the answer.
         if !self.has_computed {
             return Ok(());
         }

@@ -4,11 +4,12 @@ use crate::arguments::{EngineArgument, EngineParser, PicturesArguments, RobotArg
 use crate::output::{complain, shown};
 use anyhow::{Context, Result};
 use clap::Args;
-use needlebench_cell::{Finding, ResolvedScenario, nearest_name};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{ArmSpec, Engine, EngineError, EnginePool, Servo};
+use needlebench_input::{Finding, nearest_name};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 use needlebench_planning::Planner;
+use needlebench_scenario::ResolvedScenario;
 use std::path::PathBuf;
 
 use super::results_folder::ResultsFolder;
@@ -25,16 +26,16 @@ use needlebench_report::table::servo::text;
 
 #[derive(Debug, Args)]
 pub(crate) struct ServoArguments {
-    /// Scenario whose robot and servo are looked at, at the first goal that is reached.
+    /// Scenario with robot and servo; measured at the first goal reached.
     #[arg(value_name = "SCENARIO")]
     pub scenario: PathBuf,
-    /// One joint, such as `wrist_1`; all of them if left out.
+    /// Joint, e.g. `wrist_1` [default: all joints].
     #[arg(long, value_name = "JOINT")]
     pub joint: Option<String>,
-    /// Engines; the scenario's own choice if left out.
+    /// Physics engines [default: those of the scenario].
     #[arg(long, value_name = "ENGINE[,ENGINE]", value_parser = EngineParser)]
     pub engine: Option<EngineArgument>,
-    /// Folder for results; the scenario gets a folder of its name in it.
+    /// Folder for results; the scenario has a subfolder of its name.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
     /// Print one JSON document instead of the tables.
@@ -68,7 +69,7 @@ pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus, Failure> {
         margins,
         joints: joints(&linear, &servo, &wanted, timestep_s),
     };
-    // An unstable loop has no response; its data sheet says how far it is from stability.
+    // An unstable loop has no response; its data sheet has the stability margins.
     let mut status = ExitStatus::Success;
     if margins.spectral_radius < 1.0 {
         let options = RunOptions {
@@ -86,7 +87,7 @@ pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus, Failure> {
         }
     } else {
         complain(
-            "warning: the servo is unstable with kp, kd, rotor inertia and step as they are: no responses",
+            "warning: the servo is unstable with these kp, kd, rotor inertia and step: no responses",
         );
         status = ExitStatus::CriterionFailed;
     }
@@ -125,8 +126,9 @@ fn wanted_joints(name: Option<&str>) -> Result<Vec<usize>, Finding> {
 /// The posture at the first goal that a configuration reaches; the start posture if none does.
 fn posture(resolved: &ResolvedScenario) -> Result<(String, Joints), Finding> {
     let model = ClearanceModel::new(&resolved.cell);
-    let planner = Planner::new(resolved, &model)
-        .map_err(|error| Finding::new(&resolved.cell.robot.source.file, error.to_string()))?;
+    let planner = Planner::new(resolved, &model).map_err(|error| {
+        Finding::new(&resolved.robot_description.source.file, error.to_string())
+    })?;
     for goal in &resolved.goals {
         let plan = planner.plan(goal);
         let works = plan
@@ -151,7 +153,7 @@ fn measure_in(
     linear: &Linear,
     posture: &Joints,
 ) -> Result<(), EngineError> {
-    let settings = &resolved.scenario.engines;
+    let settings = &resolved.scenario.engines.settings();
     EnginePool::new(&[engine]).lend(engine, settings, |session| {
         let mut plant = session.make_plant(&ArmSpec::new(&resolved.cell, settings))?;
         measure(report, plant.as_mut(), servo, linear, posture)

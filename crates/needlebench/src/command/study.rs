@@ -9,8 +9,17 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use needlebench_cell::Finding;
-use needlebench_cell::study::load_study;
+use needlebench_bench::accuracy::{AccuracyError, accuracy_of_study, check_study};
+use needlebench_bench::ct::{LastScan, scanned};
+use needlebench_bench::progress::Progress as _;
+use needlebench_bench::study::{
+    Assignment, PreparedStudy, StudyCase, StudyEvaluator, assignment, in_words, time_per_case,
+};
+use needlebench_bench::{RunOptions, Runnable};
+use needlebench_input::{Finding, nothing_serves};
+use needlebench_report::files::{FilesError, StudyOutput, write_study};
+use needlebench_report::table::study::{CaseReport, case_text};
+use needlebench_scenario::study::load_study;
 use needlebench_study::{
     CSV_FILE, CaseEvaluator, FactorKind, ParquetResults, Progress as Event, Role, RunEnd, Shard,
     StudyError, StudyRun, merge as merge_shards, write_csv,
@@ -30,19 +39,10 @@ use crate::progress::TerminalProgress;
 pub(super) use arguments::ShardArgument;
 use arguments::StudyResultArguments;
 pub(crate) use arguments::{MergeArguments, STUDY_HELP, StudyArguments};
-use needlebench_bench::accuracy::{AccuracyError, accuracy_of_study, check_study};
-use needlebench_bench::ct::{LastScan, scanned};
-use needlebench_bench::progress::Progress as _;
-use needlebench_bench::study::{
-    Assignment, PreparedStudy, StudyCase, StudyEvaluator, assignment, in_words, time_per_case,
-};
-use needlebench_bench::{RunOptions, Runnable};
-use needlebench_report::files::{FilesError, StudyOutput, write_study};
-use needlebench_report::table::study::{CaseReport, case_text};
 
-/// Longest time that a study is expected to take and starts without `--yes`.
+/// Longest expected time of a study that starts without `--yes`.
 const WITHOUT_ASKING: Duration = Duration::from_mins(20);
-/// Cases of the costs of which nothing is measured before: they are few, whatever they cost.
+/// Number of cases up to which the time is not estimated in advance.
 const FEW_CASES: u64 = 200;
 
 /// Computes a study, or some of its cases.
@@ -82,7 +82,7 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus, Failure> {
     progress.finish();
     match end? {
         RunEnd::Partial { done, total } => Err(Failure::interrupted(format!(
-            "interrupted: {done} of {total} cases are in {}; --resume goes on",
+            "interrupted: {done} of {total} cases are in {}; --resume continues",
             shown(&folder)
         ))),
         RunEnd::Finished {
@@ -109,15 +109,15 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus, Failure> {
     }
 }
 
-/// A choice of which a study has nothing to compare: all that it draws are different.
+/// A note on a control factor with a range: every sampled value occurs once, so nothing can be compared.
 fn choice_with_range(prepared: &PreparedStudy) -> Option<String> {
     let mut factors = prepared.design.factors().iter();
     let factor = factors.find(|factor| {
         factor.role == Role::Choice && matches!(factor.kind, FactorKind::Continuous { .. })
     })?;
     Some(format!(
-        "note: `{}` is ours to choose and has a range: a study compares bins of it, under unlike circumstances\n\
-         hint: `needlebench search` finds the best of a range; a `grid` of it is compared pair by pair",
+        "note: control factor `{}` has a range: a study compares bins of it, under different noise factors\n\
+         hint: `needlebench search` optimises over a range; a `grid` is compared pairwise",
         factor.name
     ))
 }
@@ -150,20 +150,20 @@ pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus, Failure> {
     }
 }
 
-/// The shard that was asked for, if any, and the folder for results.
+/// The requested shard, if any, and the folder for results.
 fn asked_shard(arguments: &StudyArguments) -> Result<(Option<Shard>, PathBuf), Finding> {
     Ok(match arguments.shard {
         None => (None, arguments.out.clone()),
         Some(ShardArgument::This(shard)) => (Some(shard), arguments.out.clone()),
         Some(asked @ ShardArgument::Auto) => {
             let shard = shard_of(asked)?;
-            // All tasks have the same command line, and no two may have the same folder.
+            // All tasks have the same command line, but need different folders.
             (Some(shard), arguments.out.join(shard.part().to_string()))
         }
     })
 }
 
-/// The shard that was asked for, or that of the environment, which is said.
+/// The requested shard, or that of the environment, which is printed.
 pub(super) fn shard_of(asked: ShardArgument) -> Result<Shard, Finding> {
     match asked {
         ShardArgument::This(shard) => Ok(shard),
@@ -200,7 +200,7 @@ fn prepare_outputs(
     Ok(())
 }
 
-/// Refuses a study that will take long, and one whose cases cannot be computed.
+/// Rejects a study that will take long, and one whose cases cannot be computed.
 fn refuse_if_long(
     prepared: &PreparedStudy,
     evaluator: &dyn CaseEvaluator,
@@ -218,14 +218,16 @@ fn refuse_if_long(
     let finding = Finding::new(
         &prepared.study.source.file,
         format!(
-            "{cases} cases ({}) will take about {} on {threads} threads",
+            "{cases} cases ({}) take about {} on {threads} threads",
             prepared.product(),
             in_words(time)
         ),
     );
     Err(finding
         .key("factors")
-        .hint("--yes starts all the same; --shard K/N computes a part; fewer levels or samples cost less")
+        .hint(
+            "start it with --yes, compute a part with --shard K/N, or use fewer levels or samples",
+        )
         .into())
 }
 
@@ -257,7 +259,7 @@ pub(super) fn show(progress: &TerminalProgress, event: Event<'_>) {
     }
 }
 
-/// Statistics, page and verdict of a table that is there.
+/// Statistics, page and verdict of a complete table.
 fn finish(
     prepared: &PreparedStudy,
     folder: &Path,
@@ -284,7 +286,7 @@ fn finish(
     progress.finish();
     if matches!(written, Err(FilesError::Interrupted)) {
         return Err(Failure::interrupted(format!(
-            "interrupted: all cases are in {}, their summary is not; --resume goes on",
+            "interrupted: all cases are in {}, without summary; --resume continues",
             shown(folder)
         )));
     }
@@ -315,7 +317,7 @@ fn finish(
     Ok(ExitStatus::of(finished.verdict))
 }
 
-/// Computes cases alone.
+/// Computes single cases.
 fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus, Failure> {
     let total = prepared.design.cases();
     if let Some(case) = arguments.case.iter().find(|&&case| case >= total) {
@@ -368,7 +370,7 @@ fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitSta
     Ok(ExitStatus::Success)
 }
 
-/// Runs cases as `run` does.
+/// Runs cases like `run`.
 fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus, Failure> {
     let mut runs: Vec<(Runnable, PathBuf, RunOptions)> = Vec::new();
     let folder = arguments.out.join(&prepared.study.file.name).join("cases");
@@ -394,7 +396,11 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
                 runs.push((runnable, folder.join(number.to_string()), options));
             }
             Err(findings) => {
-                complain(&format!("case {number} cannot exist:"));
+                complain(&if nothing_serves(&findings) {
+                    format!("case {number} cannot be run, no configuration is feasible:")
+                } else {
+                    format!("case {number} is an invalid layout:")
+                });
                 return Err(findings.into());
             }
         }

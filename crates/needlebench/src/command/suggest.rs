@@ -4,20 +4,20 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
-use needlebench_bench::Stop;
 use needlebench_bench::suggest::{
     EntrySearch, PlaceSearch, SuggestError, at_place, plan_entry, plan_place, suggest_entries,
     suggest_places,
 };
-use needlebench_bench::{Control, Preview, Runnable};
-use needlebench_cell::scenario::{GoalSection, Target};
-use needlebench_cell::{
-    Finding, GoalPlacer, OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, ScenarioFamily,
-    load_open_scenario, nearest_name, read_text, resolve_scenario,
-};
+use needlebench_bench::{Control, Preview, Runnable, Stop};
+use needlebench_input::{Finding, nearest_name, read_text};
 use needlebench_report::files::{Folder, write_suggestions};
 use needlebench_report::table::suggest::{entries_text, places_text};
 use needlebench_report::write_atomically;
+use needlebench_scenario::scenario::{GoalSection, Target};
+use needlebench_scenario::{
+    GoalPlacer, OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, ScenarioFamily,
+    load_open_scenario, resolve_scenario,
+};
 use serde::Serialize;
 
 use super::record_plan::Three;
@@ -32,43 +32,42 @@ use crate::progress::TerminalProgress;
 
 #[derive(Debug, Args)]
 pub(crate) struct SuggestArguments {
-    /// Scenario with the patient, the robot and the room; its goals need no entries.
+    /// Scenario with patient, robot and room; its goals do not require entries.
     #[arg(value_name = "SCENARIO")]
     pub scenario: PathBuf,
-    /// One goal of the scenario; all of them if left out.
+    /// Goal of the scenario [default: all goals].
     #[arg(long, value_name = "NAME", conflicts_with_all = ["lesion", "target"])]
     pub goal: Option<String>,
-    /// A lesion of the phantom, instead of the scenario's goals.
+    /// Lesion of the phantom, instead of the scenario's goals.
     #[arg(long, value_name = "NAME", conflicts_with = "target")]
     pub lesion: Option<String>,
-    /// A point of the patient, instead of the scenario's goals: left, posterior, superior from mid-chest, mm.
-    #[arg(long, value_name = "X,Y,Z", allow_negative_numbers = true)]
+    /// Target point in the patient, instead of the scenario's goals: left, posterior, superior from mid-chest, mm.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub target: Option<Three>,
-    /// Entries to propose for each target; 0 for none.
+    /// Number of entries to propose per target; 0 for none.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(0..=50))]
     pub entries: u8,
-    /// Places of the robot's base to propose, for the first entries that are proposed, or with --entries 0 for
-    /// those of the scenario; 0 for none.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(0..=50))]
+    /// Number of base placements to propose, for the first proposed entries, or with --entries 0 for those of the
+    /// scenario; 0 for none.
+    #[arg(long = "placements", alias = "places", value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(0..=50))]
     pub places: u8,
-    /// Plan motions of what is proposed, and say for how many configurations there is one.
+    /// Plan motions for the proposals and print the number of configurations that have one.
     #[arg(long)]
     pub planned: bool,
-    /// Write the scenario with the first entries to a file, and with the first place where its own does not serve or
-    /// --entries is 0.
+    /// Write the scenario with the first entries to a file, and with the first base placement if its own is infeasible
+    /// or --entries is 0.
     #[arg(long, value_name = "FILE")]
     pub write: Option<PathBuf>,
-    /// With --write: replace a file that is there.
+    /// With --write: replace an existing file.
     #[arg(long, requires = "write")]
     pub force: bool,
-    /// Folder for maps of skin and room, as PNG and SVG; the scenario gets a folder of its name in it. None are
-    /// drawn if left out.
+    /// Folder for maps of skin and room, as PNG and SVG; the scenario has a subfolder of its name [default: no maps].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print one JSON document instead of the tables.
     #[arg(long)]
     pub json: bool,
-    /// Threads; the number of cores if left out. Results do not depend on it.
+    /// Number of threads [default: all cores]; does not affect results.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: Option<u16>,
     #[command(flatten)]
@@ -86,7 +85,7 @@ struct SuggestAnswer<'a> {
     written: Option<String>,
 }
 
-/// What was found, and in what.
+/// The proposals and their scenario.
 struct Found {
     resolved: ResolvedScenario,
     entries: Vec<EntrySearch>,
@@ -94,7 +93,7 @@ struct Found {
 }
 
 impl Found {
-    /// Something was found of all that was asked for.
+    /// There is a proposal for every request.
     fn is_complete(&self) -> bool {
         self.entries.iter().all(|found| !found.entries.is_empty())
             && self
@@ -104,7 +103,7 @@ impl Found {
     }
 }
 
-/// Proposes entries and places for a scenario.
+/// Proposes entries and base placements for a scenario.
 pub(crate) fn suggest(arguments: &SuggestArguments) -> Result<ExitStatus, Failure> {
     let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(false);
@@ -162,7 +161,7 @@ fn in_words(arguments: &SuggestArguments, found: &Found, written: Option<&Path>)
     }
     if let (Some(path), None) = (&arguments.write, written) {
         last.push(format!(
-            "not written: {}, since not all that is asked for was found",
+            "not written: {}, because not every request has a proposal",
             shown(path)
         ));
     }
@@ -190,7 +189,7 @@ fn find(
     let file = resolved.source.file.clone();
     let stop = |error: SuggestError| error.in_file(&file);
     let mut sections = sections(arguments, &file, goals.clone())?;
-    // What is written has to serve the other goals of the scenario too.
+    // The written scenario must be feasible for its other goals too.
     let rest: Vec<GoalSection> = goals
         .into_iter()
         .filter(|goal| arguments.write.is_some() && has_entry(goal))
@@ -198,7 +197,7 @@ fn find(
         .collect();
     let (mut entries, mut best) = (Vec::new(), Vec::new());
     for section in &sections {
-        // Places need an entry too.
+        // Base placements require an entry too.
         let is_needed = arguments.entries > 0 || !has_entry(section);
         if !is_needed {
             best.push(None);
@@ -220,7 +219,7 @@ fn find(
     let mut places = None;
     if arguments.places > 0 {
         for (section, best) in sections.iter_mut().zip(best) {
-            // Of what is proposed, and where nothing is of the best route.
+            // The first proposal, or without proposals the best needle path.
             if best.is_some() {
                 section.entry_mm = None;
                 section.entry_direction_deg = best;
@@ -235,7 +234,7 @@ fn find(
                 let names: Vec<String> = goals.iter().map(|goal| goal.name.clone()).collect();
                 (goals, names)
             }
-            // Without any entry there is nothing to stand beside.
+            // Without an entry there is no base placement.
             Err(_) if entries.iter().any(|found| found.allowed == 0) => {
                 return Ok(Found {
                     resolved,
@@ -256,7 +255,7 @@ fn find(
                 plan_place(&family, place).map_err(stop)?;
             }
         }
-        // Where the robot stands badly its entries are those from the first place.
+        // From an infeasible base placement, the entries are those for the first proposed one.
         if let Some(first) = found.places.first() {
             for each in entries.iter_mut().filter(|each| each.entries.is_empty()) {
                 let moved = at_place(&family, &each.goal, first).map_err(stop)?;
@@ -274,12 +273,12 @@ fn find(
     })
 }
 
-/// Whether it says from where the guide's pose follows.
+/// Whether it determines the guide's pose.
 fn has_entry(goal: &GoalSection) -> bool {
     goal.entry_mm.is_some() || goal.entry_direction_deg.is_some() || goal.flange_pose.is_some()
 }
 
-/// What is to be reached.
+/// The goals to reach.
 fn sections(
     arguments: &SuggestArguments,
     file: &str,
@@ -301,9 +300,11 @@ fn sections(
         return Ok(vec![section]);
     }
     if goals.is_empty() {
-        return Err(Finding::new(file, "it has no goal to propose anything for")
-            .key("goals")
-            .hint("name a target with --lesion NAME or --target X,Y,Z"));
+        return Err(
+            Finding::new(file, "the scenario has no goal to propose entries for")
+                .key("goals")
+                .hint("name a target with --lesion NAME or --target X,Y,Z"),
+        );
     }
     let Some(name) = &arguments.goal else {
         return Ok(goals);
@@ -317,14 +318,14 @@ fn sections(
         return Ok(found);
     }
     let near = nearest_name(name, names.iter().map(String::as_str));
-    let finding = Finding::new(file, format!("it has no goal `{name}`")).key("--goal");
+    let finding = Finding::new(file, format!("the scenario has no goal `{name}`")).key("--goal");
     Err(finding.hint(match near {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("goals: {}", names.join(", ")),
     }))
 }
 
-/// Writes the scenario with the first proposals, if that is wanted and they pass what `check` asks.
+/// Writes the scenario with the first proposals, if requested and if they pass `check`.
 fn written(
     arguments: &SuggestArguments,
     found: &Found,
@@ -338,9 +339,9 @@ fn written(
         return Ok(None);
     }
     if path.exists() && !arguments.force {
-        return Err(Finding::new(&to, "there is such a file already")
+        return Err(Finding::new(&to, "the file exists already")
             .key("--write")
-            .hint("choose another name, or replace it with --force")
+            .hint("choose another name, or add --force")
             .into());
     }
     let file = &found.resolved.source.file;
@@ -355,7 +356,7 @@ fn written(
         direction_deg: search.entries[0].direction_deg,
     });
     set_entries(&mut edit, &own, chosen, "suggest")?;
-    // A place that serves is kept, unless only places were asked for.
+    // A feasible base placement is kept, unless only placements were requested.
     let place = found
         .places
         .as_ref()
@@ -375,18 +376,25 @@ fn written(
         Preview::of(runnable.scenario()).map_err(|error| Finding::new(&to, error.to_string()))?;
     if let Some(first) = findings.into_iter().next() {
         let message = format!(
-            "what is proposed does not pass with the rest of the scenario: {}",
+            "the proposal fails together with the rest of the scenario: {}",
             first.message
         );
-        let hint = "other goals may need another place: propose for all of them, without --goal, --lesion and --target";
+        let hint = "other goals may require another base placement: propose for all of them, without --goal, --lesion and --target";
         return Err(Finding { message, ..first }.hint(hint).into());
     }
-    write_atomically(path, edit.text().as_bytes())
-        .map_err(|error| Finding::new(&to, format!("cannot be written: {error}")).key("--write"))?;
+    write_scenario(path, &edit)?;
     Ok(Some(path.clone()))
 }
 
-/// Where the needle for a target enters.
+/// Writes an edited scenario to the file of `--write`.
+pub(super) fn write_scenario(path: &Path, edit: &ScenarioEdit) -> Result<(), Finding> {
+    write_atomically(path, edit.text().as_bytes()).map_err(|error| {
+        let to = path.display().to_string();
+        Finding::new(to, format!("cannot be written: {error}")).key("--write")
+    })
+}
+
+/// The chosen entry for a target.
 pub(super) struct ChosenEntry<'a> {
     pub goal: &'a str,
     pub lesion: Option<&'a str>,
@@ -394,7 +402,7 @@ pub(super) struct ChosenEntry<'a> {
     pub direction_deg: [f64; 2],
 }
 
-/// Gives goals of a scenario their entries, and those that it does not have their targets, too.
+/// Sets the entries of goals of a scenario, and adds missing goals with their targets.
 pub(super) fn set_entries<'a>(
     edit: &mut ScenarioEdit,
     own: &[GoalSection],
@@ -407,25 +415,26 @@ pub(super) fn set_entries<'a>(
         let section = format!("goals[{}]", index.unwrap_or(next));
         if index.is_none() {
             next += 1;
+            edit.set(&section, "name", &format!("\"{}\"", entry.goal))?;
             let [x, y, z] = entry.target_in_phantom_m.map(|m| (m * 1e4).round() / 10.0);
             match entry.lesion {
                 Some(lesion) => edit.set(&section, "lesion", &format!("\"{lesion}\""))?,
                 None => edit.set(&section, "target_mm", &format!("[{x}, {y}, {z}]"))?,
             }
-            // It was judged with these.
+            // It was evaluated with these.
             if let Some(like) = own.first().filter(|goal| goal.flange_pose.is_none()) {
                 edit.set(&section, "standoff_mm", &format!("{}", like.standoff_mm))?;
                 edit.set(&section, "approach_mm", &format!("{}", like.approach_mm))?;
             }
         }
         let [azimuth, elevation] = entry.direction_deg;
-        // Comments on the lines of the former entry go with it; those elsewhere cannot be told.
+        // Comments on the lines of the former entry are removed with it; others cannot be identified.
         let length = edit.text().len();
         edit.remove(&section, "entry_mm")?;
         edit.remove(&section, "entry_direction_deg")?;
         edit.remove(&section, "route")?;
         let former = if edit.text().len() < length {
-            "; what comments here say of an entry is of the former one"
+            "; comments here may refer to the former entry"
         } else {
             ""
         };
@@ -435,7 +444,7 @@ pub(super) fn set_entries<'a>(
     Ok(())
 }
 
-/// Without lines: they are those of a file that is not there.
+/// Removes line numbers: they refer to a file that does not exist.
 pub(super) fn unplaced(findings: Vec<Finding>) -> Vec<Finding> {
     let findings = findings.into_iter();
     findings

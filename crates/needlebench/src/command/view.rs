@@ -10,7 +10,8 @@ use anyhow::{Context, Result};
 use clap::Args;
 use needlebench_bench::ct::{BuildFiles, VOLUME_FILE, imaged};
 use needlebench_bench::{Control, Stop};
-use needlebench_cell::{Finding, Overrides, load_scenario};
+use needlebench_input::Finding;
+use needlebench_scenario::{Overrides, load_scenario};
 use needlebench_viewer::{Case, Server, Stopper};
 use tempfile::NamedTempFile;
 
@@ -23,24 +24,24 @@ use crate::interrupts::threads;
 use crate::output::shown;
 use crate::progress::TerminalProgress;
 
-/// What `view --help` says after the options.
+/// What `view --help` prints after the options.
 pub(crate) const VIEW_HELP: &str = "\
 Example: needlebench view out/patient
 
-DIR is what `needlebench ct build SCAN --out DIR` made. A SCENARIO with a section [ct] is scanned and built first, into
-out/NAME/view. The address that is printed has a secret in it: who has it can see the patient, nobody else on this
-machine can. Nothing leaves the machine, and nothing is written outside the folder: session.toml (what was decided; it is
-there again the next time), session.lock (one program at a time), planned.toml (the plan, for `run`), runs/ (what was
-simulated from the page) and, while it runs, open-*.html (what the browser is sent to).
+DIR is the output of `needlebench ct build SCAN --out DIR`. A SCENARIO with a section [ct] is scanned and built first, in
+out/NAME/view. The printed address contains a secret: it alone gives access to the patient data on this machine. No
+data leave the machine, and only this folder is written to: session.toml (decisions, restored at the next start),
+session.lock (one program at a time), planned.toml (the plan, for `run`), runs/ (simulations started on the page) and,
+while the server runs, open-*.html (redirects the browser).
 
 Ctrl-C ends it. Not a medical device.";
 
 #[derive(Debug, Args)]
 pub(crate) struct ViewArguments {
-    /// Folder that `ct build` made, or a scenario that begins with a scan.
+    /// Folder written by `ct build`, or a scenario with a section [ct].
     #[arg(value_name = "DIR|SCENARIO")]
     path: PathBuf,
-    /// Port of 127.0.0.1; any that is free if left out.
+    /// Port on 127.0.0.1; 0 for any free one.
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
     /// Print the address without opening it in a browser.
@@ -62,10 +63,10 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus, Failure> {
             stopper.stop();
         }
     })
-    .context("cannot watch for interrupts")?;
+    .context("cannot install the interrupt handler")?;
     let folder = folder(&arguments.path, &overrides, &cancel)?;
     let case = Case::open(&folder, &overrides, &cancel).map_err(stopped)?;
-    let program = std::env::current_exe().context("this program does not find itself")?;
+    let program = std::env::current_exe().context("cannot determine the path of this program")?;
     let server = Server::new(case, arguments.port, program).map_err(|error| {
         let hint = error.hint();
         let hint = hint.map_or_else(String::new, |hint| format!("\nhint: {hint}"));
@@ -75,13 +76,13 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus, Failure> {
         }
     })?;
     let _ = stopper.set(server.stopper());
-    // Interrupted while the folder was read: nobody was there to be stopped.
+    // Interrupted while the folder was read: there was no server to stop.
     if cancel.load(Ordering::Relaxed) {
         return Ok(ExitStatus::Interrupted);
     }
     let url = server.url();
     print_text(&format!(
-        "{url}\nthe planning page of {}; Ctrl-C ends it",
+        "{url}\nplanning page of {}; Ctrl-C ends it",
         shown(&folder)
     ))?;
     let page = (!arguments.no_open).then(|| redirect(&folder, &url));
@@ -95,10 +96,10 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus, Failure> {
 }
 
 fn stopped(stop: Stop) -> Failure {
-    Failure::of_stop(stop, "interrupted while the scan was made")
+    Failure::of_stop(stop, "interrupted while the scan was computed")
 }
 
-/// The folder of a patient, built if need be.
+/// The folder of a patient, built if necessary.
 fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<PathBuf, Failure> {
     if path.is_dir() {
         return Ok(path.to_owned());
@@ -110,8 +111,8 @@ fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<Pat
     let resolved = load_scenario(path, overrides)?;
     let name = path.display().to_string();
     if resolved.scenario.ct.is_none() {
-        let finding = Finding::new(&name, "it has a patient, but no scan to show").hint(format!(
-            "add a section [ct], or make a scan of it: `needlebench ct synth {name} --markers ct-sphere --out out/ct`, then \
+        let finding = Finding::new(&name, "the scenario has a patient but no scan").hint(format!(
+            "add a section [ct], or synthesise a scan: `needlebench ct synth {name} --markers ct-sphere --out out/ct`, then \
              `needlebench ct build out/ct/ct.nii.gz --room {name} --markers out/ct/marker_list.toml --lesion NAME=X,Y,Z \
              --out out/patient`, then `needlebench view out/patient`"
         ));
@@ -134,8 +135,8 @@ fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<Pat
     made.map(|_| folder).map_err(stopped)
 }
 
-/// A page in the folder that leads to an address, readable by its owner alone: on a command line everybody could read the
-/// secret. It goes when the server ends.
+/// A page in the folder that redirects to an address, readable by its owner only: a command line would show the secret
+/// to other users. It is removed when the server ends.
 fn redirect(folder: &Path, url: &str) -> std::io::Result<NamedTempFile> {
     let mut page = tempfile::Builder::new()
         .prefix("open-")

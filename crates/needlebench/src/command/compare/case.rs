@@ -1,11 +1,11 @@
-//! A case of a study beside a run.
+//! A case of a study compared with a run.
 
 use std::path::Path;
 
-use needlebench_cell::Finding;
 use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::metric::MetricKey;
 use needlebench_evaluation::{StoredConfiguration, StoredReport};
+use needlebench_input::Finding;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_study::{FactorKind, FactorValue, Outcome, ParquetResults, Results, Row};
 
@@ -24,8 +24,8 @@ pub(super) fn case_of_study(path: &Path, case: Option<u64>) -> Result<StoredRepo
         Some(case) => case,
         None if cases == 1 => 0,
         None => {
-            let message = format!("a run is compared with one of the study's {cases} cases");
-            return Err(refused(message, "say which: `--case N`".to_owned()));
+            let message = format!("the study has {cases} cases, and a run is compared with one");
+            return Err(refused(message, "select one: `--case N`".to_owned()));
         }
     };
     let mut found = None;
@@ -73,7 +73,7 @@ fn configuration(row: &Row, keys: &[Option<MetricKey>]) -> StoredConfiguration {
         let value = f64::from(row.get(index)?) * key.metric().unit.si;
         Some((key.key().into_owned(), value))
     });
-    // A criterion that was missed is none.
+    // A failed criterion is not a rejection.
     let rejected = matches!(row.outcome, Outcome::Rejected | Outcome::Invalid);
     StoredConfiguration {
         label: Configuration::ALL[usize::from(row.configuration)].label(),

@@ -1,25 +1,25 @@
-//! What `needlebench compare --help` says after the arguments: with every metric of the table.
+//! What `needlebench compare --help` prints after the arguments, with every metric of the table.
 
 use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::metric::{Metric, MetricKey, metrics};
 use needlebench_study::compare::STUDY_RATES;
 
 const INTRODUCTION: &str = "\
-Exits with 1 if a configuration that worked fails or is rejected (unless --allow-status-change), if a \
-goal, a configuration or a metric is missing in the second result (unless --allow-lost), if a metric got \
-worse than its --max-loss allows: METRIC[:CONFIGURATION]=VALUE, or if either result is incomplete.
+Exit status 1: a feasible configuration fails or is rejected in B (unless --allow-status-change); a goal, a \
+configuration or a metric is missing in B (unless --allow-lost); a metric is worse by more than its --max-loss, \
+METRIC[:CONFIGURATION]=VALUE; or either result is incomplete.
 
-Two studies (folders with results.parquet, or such tables) are compared case by case if they have \
-the same cases, else by 95 % intervals. They exit with 1 if more than chance was lost of the layouts \
-that work or of a configuration's success rate (unless --allow-status-change, or a --max-loss is on \
-it), if cases or a metric are missing in the second (unless --allow-lost), or if a --max-loss is exceeded: METRIC[@PERCENT][:CONFIGURATION]=VALUE, the quantile at PERCENT \
-(default 5, of errors 95) of a configuration, of `every` one, or of the `best` of each layout (default).
+Two studies (folders with results.parquet, or such tables) are compared case by case if they have the same \
+cases, otherwise by 95 % confidence intervals. Exit status 1: the share of feasible layouts or the success rate \
+of a configuration is significantly lower in B (unless --allow-status-change, or a --max-loss is on it); cases or \
+a metric are missing in B (unless --allow-lost); or a --max-loss is exceeded, \
+METRIC[@PERCENT][:CONFIGURATION]=VALUE: the percentile PERCENT (default 5, 95 for errors) of a configuration, of \
+`every` one, or of the `best` per layout (default).
 
-A run beside a study: with --case, the case's rows are compared like a run of its goal.
+Run and study: with --case, the rows of the case are compared like a run of its goal.
 
-Each line has what is known of one thing in several ways; each name is one of them. Where the first \
-result does not have the first of a line, that name stands for the next that both have, and the \
-comparison says so. `_static` is of static cases of studies.
+Each line lists variants of one quantity. If the first result lacks the first variant of a line, the next one \
+that both results have is used, with a note. `_static` marks static cases of studies.
 ";
 
 const EXAMPLES: &str = "\
@@ -49,7 +49,7 @@ pub(crate) fn compare_help() -> String {
     )
 }
 
-/// The metrics of a family, what says most first.
+/// The metrics of a family, the most informative first.
 fn family(name: &str) -> String {
     let members = || metrics().rev().filter(|metric| metric.family == name);
     let of_runs = members().map(|metric| metric.key.to_owned());

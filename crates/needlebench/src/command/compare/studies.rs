@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use needlebench_cell::Finding;
 use needlebench_evaluation::metric::resolve;
 use needlebench_evaluation::{Compared, Loss, Rate, Subject, Threshold};
+use needlebench_input::Finding;
+use needlebench_report::table::study_comparison::{Listed, study_comparison_text};
+use needlebench_report::{study_comparison_junit, study_comparison_markdown, write_atomically};
 use needlebench_study::compare::{
     ComparedStudy, STUDY_RATES, StudyCompareOptions, StudyComparison, StudyLimit, StudyPair,
     StudySubject, StudyThreshold,
@@ -20,8 +22,6 @@ use crate::clock::elapsed;
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::output::{print_wide, shown};
-use needlebench_report::table::study_comparison::{Listed, study_comparison_text};
-use needlebench_report::{study_comparison_junit, study_comparison_markdown, write_atomically};
 
 /// Whether a path is a study's folder, or its table.
 pub(super) fn is_study(path: &Path) -> bool {
@@ -31,7 +31,7 @@ pub(super) fn is_study(path: &Path) -> bool {
     is_table || path.join(RESULTS_FILE).is_file() || path.join(MANIFEST_FILE).is_file()
 }
 
-/// Compares two studies; none if either is not one.
+/// Compares two studies; none if either is not a study.
 pub(super) fn compare_if_studies(
     arguments: &CompareArguments,
 ) -> Result<Option<ExitStatus>, Failure> {
@@ -113,8 +113,8 @@ fn compared(
     }))
 }
 
-/// A threshold in the units of the studies' columns, on the metric that both can be compared by; and
-/// what there is to say where that is not the one that was asked for.
+/// A threshold in the units of the studies' columns, on a metric that both have, and a note if that is not the
+/// requested one.
 fn on_columns(threshold: &Threshold, pair: &StudyPair<'_>) -> (StudyThreshold, Option<String>) {
     let (subject, si, note) = match &threshold.subject {
         Subject::Rate(rate) => {
@@ -146,7 +146,7 @@ fn on_columns(threshold: &Threshold, pair: &StudyPair<'_>) -> (StudyThreshold, O
     (of_study, note)
 }
 
-/// Everything that can be wrong before a table is read.
+/// Checks the arguments before a table is read.
 fn prepare(arguments: &CompareArguments) -> Result<Prepared, Failure> {
     let given = given(arguments)?;
     for (path, argument) in [
@@ -161,19 +161,19 @@ fn prepare(arguments: &CompareArguments) -> Result<Prepared, Failure> {
     Ok(Prepared { given, results })
 }
 
-/// Thresholds and what else is said of the comparison.
+/// Thresholds and other options of the comparison.
 fn given(arguments: &CompareArguments) -> Result<Given, Vec<Finding>> {
     let mut findings = Vec::new();
     if arguments.case.is_some() {
         findings.push(
-            Finding::new("--case", "two studies are compared with all their cases")
-                .hint("`--case` is the case of a study that a run is compared with"),
+            Finding::new("--case", "two studies are compared in all cases")
+                .hint("`--case` selects the case of a study to compare with a run"),
         );
     }
     if !arguments.goal.is_empty() {
         findings.push(
-            Finding::new("--goal", "goals of studies cannot be matched by hand")
-                .hint("studies with other goals are compared by their rates and quantiles"),
+            Finding::new("--goal", "goals of studies cannot be matched manually")
+                .hint("studies with different goals are compared by rates and quantiles"),
         );
     }
     let rates = STUDY_RATES.map(|rate| Rate {

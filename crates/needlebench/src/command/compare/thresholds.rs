@@ -1,8 +1,9 @@
-//! Losses that are allowed, from the command line and from a file.
+//! Permitted losses, from the command line and from a file.
 
-use needlebench_cell::{Finding, ThresholdsFile};
 use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::{Compared, Threshold};
+use needlebench_input::Finding;
+use needlebench_scenario::ThresholdsFile;
 
 use super::{CompareArguments, Pair};
 
@@ -13,7 +14,7 @@ pub(super) struct Given {
     pub allow_lost: bool,
 }
 
-/// Reads the file of thresholds and the arguments, which go before it; of several on one number the last
+/// Reads the file of thresholds and the arguments, which take precedence; of several on one number the last
 /// counts.
 pub(super) fn thresholds(
     arguments: &CompareArguments,

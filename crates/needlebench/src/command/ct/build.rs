@@ -12,18 +12,18 @@ use needlebench_bench::ct::{
     ScanBuild, build, write_patient,
 };
 use needlebench_bench::{Control, Stop};
-use needlebench_cell::scenario::{GoalSection, Posture, Target};
-use needlebench_cell::{
-    Finding, MarkerFrame, MarkerList, Overrides, load_open_scenario, name_from_file,
-    resolve_open_scenario,
-};
 use needlebench_imaging::markers::MarkerModel;
 use needlebench_imaging::read::{ReadVolume, read_label_names};
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker, Registration};
 use needlebench_imaging::{LesionSeed, SurfaceSizes};
-use needlebench_report::layout;
+use needlebench_input::Finding;
 use needlebench_report::picture::{SlicePicture, slice_pictures};
 use needlebench_report::write_atomically;
+use needlebench_scenario::scenario::{GoalSection, Posture, Target};
+use needlebench_scenario::{
+    MarkerFrame, MarkerList, Overrides, load_open_scenario, name_from_file, resolve_open_scenario,
+};
+use needlebench_show::layout;
 use serde::Serialize;
 
 use super::info::ReadArguments;
@@ -36,70 +36,75 @@ use crate::interrupts::watch_interrupts;
 use crate::output::shown;
 use crate::progress::TerminalProgress;
 
-/// What `ct build --help` says after the options.
+/// What `ct build --help` prints after the options.
 pub(crate) const BUILD_HELP: &str = "\
 Example: needlebench ct build scan.nii.gz --out out/patient --lesion nodule=-60,40,-112 --markers markers.toml
 
 Writes into DIR:
-  scenario.toml       what `run`, `check`, `suggest` and all else take as it is
+  scenario.toml       ready for `run`, `check`, `suggest` and all other commands
   surfaces/           closed surfaces as STL, mm, LPS
-  labels.nii.gz       what each voxel is; its names are in labels.json
-  volume.nii.gz       the volume along the patient's axes, for `view`
-  slices/             pictures of slices with the surfaces' outlines on them
+  labels.nii.gz       label map; names in labels.json
+  volume.nii.gz       the volume aligned with the patient's axes, for `view`
+  slices/             images of slices with the outlines of the surfaces
   report.json         surfaces with their distance from the voxels, lesions, markers, registration, errors; m and rad
 
-Places are in the patient's LPS frame of the scan (left, posterior, superior), mm. 3D Slicer shows RAS: there the first two
-numbers have the other sign.
+Positions are in the LPS frame of the scan (left, posterior, superior), mm. 3D Slicer shows RAS: change the sign of its
+first two numbers.
 
-MARKERS.toml: frame = \"base_link\", \"base\" (as the controller shows it) or \"drawing\"; sphere_mm; sd_mm; and for each
-marker [[markers]] with name and position_mm. With \"base_link\" or \"base\" the robot is placed by them.";
+MARKERS.toml: frame = \"base_link\", \"base\" (as shown by the controller) or \"drawing\"; sphere_mm; sd_mm; and for each
+marker [[markers]] with name and position_mm. With \"base_link\" or \"base\" they register the robot to the patient.";
 
 #[derive(Debug, Args)]
 pub(crate) struct BuildArguments {
     /// .nii, .nii.gz, .hdr, a DICOM file, or a folder of DICOM files.
     #[arg(value_name = "PATH")]
     path: PathBuf,
-    /// Folder for what is built.
+    /// Folder for the results.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// A point in a lesion, mm of the scan (LPS): the lesion is grown from it, and is a goal.
+    /// Seed point in a lesion, mm in the scan (LPS); the lesion is segmented from it and becomes a goal.
     #[arg(long = "lesion", value_name = "NAME=X,Y,Z", value_parser = named_place, allow_hyphen_values = true)]
     lesions: Vec<NamedPlace>,
-    /// The same by the voxel, as viewers show it: column, row and slice in the file, from 0.
+    /// The same as a voxel index, as viewers show it: column, row and slice in the file, from 0.
     #[arg(long = "lesion-voxel", value_name = "NAME=I,J,K", value_parser = named_place)]
     lesion_voxels: Vec<NamedPlace>,
-    /// Where the needle for a lesion enters the skin, mm of the scan; the best entry that `suggest` finds if left out.
+    /// Skin entry for a lesion, mm in the scan [default: the best entry that `suggest` finds].
     #[arg(long = "entry", value_name = "NAME=X,Y,Z", value_parser = named_place, allow_hyphen_values = true)]
     entries: Vec<NamedPlace>,
-    /// Structures from elsewhere, such as 3D Slicer or TotalSegmentator: NIfTI or DICOM segmentation.
+    /// Segmentation by another program, e.g. 3D Slicer or TotalSegmentator: NIfTI or DICOM segmentation.
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
-    /// Which label is called what: JSON, a colour table of 3D Slicer, or lines of `1,lung_left`.
+    /// Names of the labels: JSON, a 3D Slicer colour table, or lines like `1,lung_left`.
     #[arg(long, value_name = "FILE", requires = "labels")]
     label_names: Option<PathBuf>,
-    /// Markers as the robot or a drawing has them, by which the patient is registered.
+    /// Marker positions in the robot or drawing frame, to register the patient.
     #[arg(long, value_name = "FILE")]
     markers: Option<PathBuf>,
-    /// Robot, tool, table, people and criteria of this scenario; a UR3 beside a table if left out.
+    /// Scenario for robot, tool, table, people and criteria [default: a UR3 beside a table].
     #[arg(long, value_name = "SCENARIO")]
     room: Option<PathBuf>,
-    /// How the patient lies; as in the room's scenario, or on the back, if left out. With markers that the robot has touched
-    /// it follows from them.
-    #[arg(long, value_enum)]
+    /// Patient position [default: that of the room's scenario, or supine]; markers digitised with the robot override
+    /// it.
+    #[arg(
+        long = "patient-position",
+        alias = "posture",
+        value_name = "POSITION",
+        value_enum
+    )]
     posture: Option<PostureArgument>,
-    /// What a slice integrates over, mm, where the file does not say it.
+    /// Slice thickness, mm, if it is not in the file.
     #[arg(long, value_name = "MM", value_parser = super::synth::positive)]
     thickness_mm: Option<f64>,
-    /// Triangles of the skin.
+    /// Number of triangles of the skin surface.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(100..=2_000_000))]
     skin_triangles: Option<u32>,
-    /// Write no label map.
+    /// Do not write the label map.
     #[arg(long)]
     no_labels: bool,
-    /// Write no volume: `view` cannot show the folder then.
+    /// Do not write the volume; `view` requires it.
     #[arg(long)]
     no_volume: bool,
-    /// Print what was built as one JSON document.
+    /// Print one JSON document.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -138,14 +143,16 @@ struct NamedPlace {
 fn named_place(text: &str) -> Result<NamedPlace, String> {
     let (name, numbers) = text
         .split_once('=')
-        .ok_or_else(|| "a name and three numbers: nodule=-60,40,-112".to_owned())?;
+        .ok_or_else(|| "expected a name and three numbers: nodule=-60,40,-112".to_owned())?;
     let is_name = !name.is_empty()
         && name.len() <= 64
         && name
             .chars()
             .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
     if !is_name {
-        return Err(format!("`{name}` is no name: letters, digits, `-` and `_`"));
+        return Err(format!(
+            "`{name}` is not a valid name: use letters, digits, `-` and `_`"
+        ));
     }
     Ok(NamedPlace {
         name: name.to_owned(),
@@ -154,7 +161,7 @@ fn named_place(text: &str) -> Result<NamedPlace, String> {
 }
 
 impl BuildArguments {
-    /// What is written besides surfaces, report and scenario.
+    /// Files besides surfaces, report and scenario.
     fn files(&self) -> BuildFiles {
         BuildFiles {
             labels: !self.no_labels,
@@ -216,7 +223,7 @@ pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus, Failu
     }
 }
 
-/// What a scan is read with.
+/// Inputs besides the scan.
 struct Given {
     markers: Option<MarkerList>,
     names: Option<Vec<(u16, String)>>,
@@ -227,7 +234,7 @@ fn make(
     arguments: &BuildArguments,
     control: &Control<'_>,
 ) -> Result<(ScanBuild, PathBuf), Failure> {
-    let stopped = |stop| Failure::of_stop(stop, "interrupted: there is no scenario.toml yet");
+    let stopped = |stop| Failure::of_stop(stop, "interrupted: no scenario.toml was written");
     let given = given(arguments).map_err(stopped)?;
     let _taken = ResultsFolder::take_private(&arguments.out)?;
     make_of(arguments, given, control).map_err(stopped)
@@ -292,11 +299,11 @@ fn make_of(
     };
     let built = build(read, &options, control).map_err(|error| Stop::of_scan(path, error))?;
     if arguments.pictures.are_wanted(arguments.json) {
-        control.progress.message("pictures");
+        control.progress.message("images");
         draw(&built, &arguments.out)?;
     }
     let goals = goals(arguments, &built, &goals_for);
-    let first = "What `needlebench ct build` made of a scan; report.json says how.";
+    let first = "Built from a scan by `needlebench ct build`; details in report.json.";
     let room = Room {
         scenario: &room.scenario,
         resolved: &room.resolved,
@@ -314,10 +321,10 @@ fn make_of(
     Ok((built, file))
 }
 
-/// The room, by its own file or the usual one.
+/// The room, from its file or the default one.
 struct OwnRoom {
-    scenario: needlebench_cell::scenario::Scenario,
-    resolved: needlebench_cell::ResolvedScenario,
+    scenario: needlebench_scenario::scenario::Scenario,
+    resolved: needlebench_scenario::ResolvedScenario,
     folder: PathBuf,
 }
 
@@ -347,7 +354,7 @@ fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, St
     })
 }
 
-/// Names of surfaces that are always looked for.
+/// Reserved names of surfaces.
 const TAKEN: [&str; 6] = [
     "skin",
     "bone",
@@ -377,9 +384,9 @@ fn lesions(arguments: &BuildArguments, read: &ReadVolume) -> Result<Vec<LesionSe
         .find(|(name, count)| **count > 1 || TAKEN.contains(name))
     {
         return Err(
-            Finding::new(file, format!("`{name}` is the name of something else too"))
+            Finding::new(file, format!("the name `{name}` is already in use"))
                 .key("--lesion")
-                .hint("give each lesion its own name")
+                .hint("give each lesion a unique name")
                 .into(),
         );
     }
@@ -398,7 +405,7 @@ fn check_entries(arguments: &BuildArguments, lesions: &[String]) -> Result<(), S
             format!("there is no lesion `{}`", entry.name),
         )
         .key("--entry")
-        .hint("an entry has the name of a --lesion")
+        .hint("an entry requires a --lesion of its name")
         .into()),
     }
 }
@@ -456,14 +463,14 @@ fn goals(arguments: &BuildArguments, built: &ScanBuild, lesions: &[String]) -> V
     .collect()
 }
 
-/// Pictures of slices, into a folder of their own.
+/// Writes images of slices into their own folder.
 fn draw(built: &ScanBuild, out: &Path) -> Result<(), Stop> {
     let folder = out.join("slices");
     let failed = |path: &Path, error: &dyn std::fmt::Display| {
         Stop::from(
             Finding::new(
                 path.display().to_string(),
-                format!("it cannot be written: {error}"),
+                format!("cannot be written: {error}"),
             )
             .key("--out"),
         )
@@ -490,12 +497,12 @@ fn in_words(built: &ScanBuild, arguments: &BuildArguments, file: &Path) -> Resul
     )?;
     write!(
         text,
-        "\n\nsurface            triangles  volume (ml)  from voxels, 99 % (mm)"
+        "\n\nsurface            triangles  volume (ml)  P99 to voxels (mm)"
     )?;
     for surface in &report.surfaces {
         write!(
             text,
-            "\n{:<18} {:>9}  {:>11.1}  {:>22.3}",
+            "\n{:<18} {:>9}  {:>11.1}  {:>18.3}",
             surface.name,
             surface.triangles,
             surface.volume_m3 * 1e6,
@@ -508,18 +515,14 @@ fn in_words(built: &ScanBuild, arguments: &BuildArguments, file: &Path) -> Resul
                 let [x, y, z]: [f64; 3] = (size.centroid_m.coords * 1e3).into();
                 write!(
                     text,
-                    "\n\nlesion {}: {:.1} ml, {:.1} x {:.1} mm in its slice, middle at ({x:.1}, {y:.1}, {z:.1}) mm of the scan",
+                    "\n\nlesion {}: {:.1} ml, axial diameters {:.1} x {:.1} mm, centroid ({x:.1}, {y:.1}, {z:.1}) mm in the scan",
                     lesion.name,
                     size.volume_m3 * 1e6,
                     size.axial_longest_m * 1e3,
                     size.axial_width_m * 1e3
                 )?;
             }
-            None => write!(
-                text,
-                "\n\nlesion {}: it has no surface, and is no goal",
-                lesion.name
-            )?,
+            None => write!(text, "\n\nlesion {}: no surface, not a goal", lesion.name)?,
         }
     }
     if let Some(registered) = &built.registered {
@@ -535,13 +538,13 @@ fn in_words(built: &ScanBuild, arguments: &BuildArguments, file: &Path) -> Resul
     if built.registered.is_none() {
         write!(
             text,
-            "\nnote: there are no --markers, so nothing says where the robot is from this patient: it stands as in the room"
+            "\nnote: no --markers: scan not registered to the robot; base placement taken from the room"
         )?;
     }
     if report.targets.is_empty() {
         write!(
             text,
-            "\nnote: there is no lesion, so the scenario has no goals yet: --lesion NAME=X,Y,Z, or write [[goals]]"
+            "\nnote: no lesion, so the scenario has no goals: add --lesion NAME=X,Y,Z, or write [[goals]]"
         )?;
     }
     write!(
@@ -560,7 +563,7 @@ fn write_registration(
 ) -> std::fmt::Result {
     write!(
         text,
-        "\n\nmarker             residual (mm)  expected (mm)  by the others (mm)"
+        "\n\nmarker             residual (mm)  expected (mm)  leave-one-out (mm)"
     )?;
     for marker in &registration.markers {
         let others = marker.leave_one_out.as_ref().map_or_else(
@@ -577,7 +580,7 @@ fn write_registration(
     }
     write!(
         text,
-        "\nmarkers agree to {:.2} mm rms (FRE; {:.2} expected), which does not tell the error at the target:",
+        "\nFRE {:.2} mm RMS ({:.2} expected); FRE does not predict the TRE:",
         registration.fre_rms_m * 1e3,
         registration.expected_fre_rms_m * 1e3
     )?;
@@ -589,7 +592,7 @@ fn write_registration(
                 .sqrt();
             write!(
                 text,
-                "\n  {}: registration {:.2} mm rms (TRE), place in the scan {:.2} mm rms",
+                "\n  {}: TRE {:.2} mm RMS, target localisation error {:.2} mm RMS",
                 target.name,
                 error.rms_m * 1e3,
                 seen * 1e3

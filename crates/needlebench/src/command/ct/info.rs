@@ -7,10 +7,10 @@ use std::sync::atomic::AtomicBool;
 use anyhow::Result;
 use clap::Args;
 use needlebench_bench::Stop;
-use needlebench_cell::Finding;
 use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_volume};
 use needlebench_imaging::{HuHistogram, ImagingError, Orientation, Remark};
-use needlebench_report::layout;
+use needlebench_input::Finding;
+use needlebench_show::layout;
 use serde::Serialize;
 
 use crate::command::{print_json, print_text};
@@ -22,25 +22,25 @@ use crate::output::shown;
 /// Shares of the voxels whose Hounsfield units are printed.
 const QUANTILES: [f64; 7] = [0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99];
 
-/// Angle up to which slices lie straight above one another, in what people read.
+/// Shear below which slices count as orthogonal in the printed text.
 const STRAIGHT_DEG: f64 = 0.01;
 
-/// How a CT is read: of all commands that read one.
+/// How a CT is read, for all commands that read one.
 #[derive(Debug, Args)]
 pub(crate) struct ReadArguments {
-    /// Which series of a DICOM folder, by its number in the list of a refusal, or by its UID.
+    /// Series of a DICOM folder, by its UID or by its number in the list that an ambiguous folder gives.
     #[arg(long, value_name = "SERIES")]
     series: Option<String>,
-    /// Interpolate single missing slices, which are refused otherwise.
+    /// Interpolate single missing slices instead of rejecting the volume.
     #[arg(long)]
     fill_gaps: bool,
-    /// To which sides of the patient columns, rows and slices run, in a NIfTI file that does not say it.
+    /// Voxel axis orientation (e.g. LPS) for NIfTI files without sform or qform.
     #[arg(long, value_name = "LPS")]
     assume_orientation: Option<Orientation>,
-    /// Most memory that the voxels may take, in MiB.
+    /// Memory limit for the voxels, in MiB.
     #[arg(long, value_name = "MIB", default_value_t = 4096)]
     max_memory: u32,
-    /// Threads; as many as the machine has cores if left out. Results do not depend on it.
+    /// Number of threads [default: all cores]; does not affect results.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
 }
@@ -61,12 +61,12 @@ impl ReadArguments {
         read_volume(path, &options, self.threads(), cancel)
     }
 
-    /// Most bytes that the voxels may take.
+    /// Memory limit for the voxels, in bytes.
     pub(crate) fn max_bytes(&self) -> u64 {
         u64::from(self.max_memory) << 20
     }
 
-    /// Threads.
+    /// Number of threads.
     pub(crate) fn threads(&self) -> usize {
         threads(self.jobs)
     }
@@ -99,7 +99,7 @@ struct VolumeAnswer {
     size: [usize; 3],
     spacing_m: [f64; 3],
     extent_m: [f64; 3],
-    /// Letters of the sides of the patient to which i, j and k run.
+    /// Letters of the patient sides towards which i, j and k increase.
     orientation: String,
     /// Centre of the first voxel, in LPS.
     first_voxel_m: [f64; 3],
@@ -128,7 +128,7 @@ struct Quantile {
     hu: i16,
 }
 
-/// Reads a CT, and says what it is.
+/// Reads and describes a CT.
 pub(crate) fn info(arguments: &InfoArguments) -> Result<ExitStatus, Failure> {
     let cancel = watch_interrupts()?;
     let read = arguments.reading.read(&arguments.path, &cancel);
@@ -260,7 +260,7 @@ fn in_words(path: &Path, volume: &VolumeAnswer, remarks: &[Remark]) -> Result<St
             "air",
             match hu.air_peak {
                 Some(peak) if hu.has_air_peak => format!("peak at {peak} HU"),
-                Some(peak) => format!("peak at {peak} HU, which is not air's"),
+                Some(peak) => format!("peak at {peak} HU, not that of air"),
                 None => "none".to_owned(),
             },
         )?;
@@ -274,10 +274,10 @@ fn in_words(path: &Path, volume: &VolumeAnswer, remarks: &[Remark]) -> Result<St
     Ok(text)
 }
 
-/// Of slices, against the distance between them.
+/// Slice thickness, compared with the slice spacing.
 fn thickness(volume: &VolumeAnswer) -> String {
     let Some(thickness_m) = volume.slice_thickness_m else {
-        return "not known".to_owned();
+        return "unknown".to_owned();
     };
     let between_m = volume.spacing_m[2] * libm::cos(volume.tilt_rad);
     let thickness_mm = thickness_m * 1e3;
@@ -289,7 +289,7 @@ fn thickness(volume: &VolumeAnswer) -> String {
         format!("{thickness_mm:.3} mm: slices overlap by {difference_mm:.3} mm")
     } else {
         format!(
-            "{thickness_mm:.3} mm: {:.3} mm between slices were not seen",
+            "{thickness_mm:.3} mm: gaps of {:.3} mm between slices",
             -difference_mm
         )
     }
@@ -298,7 +298,7 @@ fn thickness(volume: &VolumeAnswer) -> String {
 fn orientation(volume: &VolumeAnswer) -> String {
     let tilt_deg = volume.tilt_rad.to_degrees();
     let mut words = format!(
-        "{} (columns, rows, slices run to {})",
+        "{} (columns, rows, slices increase towards {})",
         volume.orientation,
         sides(&volume.orientation)
     );

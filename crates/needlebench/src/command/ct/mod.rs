@@ -24,22 +24,22 @@ pub(crate) struct CtArguments {
 
 #[derive(Debug, Subcommand)]
 enum CtCommand {
-    /// What a volume is: geometry, Hounsfield units, and what is wrong with it.
+    /// Describe a volume: geometry, Hounsfield units and defects.
     #[command(after_help = "Example: needlebench ct info scan.nii.gz")]
     Info(InfoArguments),
-    /// Surfaces, lesions, markers and a scenario from a volume.
+    /// Build surfaces, lesions, markers and a scenario from a volume.
     #[command(
         after_help = "Example: needlebench ct build scan.nii.gz --out out/patient --lesion nodule=-60,40,-112 --markers markers.toml",
         after_long_help = BUILD_HELP
     )]
     Build(Box<BuildArguments>),
-    /// Ways for a needle to a target without harm, and which of them the robot can serve.
+    /// Plan admissible needle paths to a target and check which of them are feasible for the robot.
     #[command(
         after_help = "Example: needlebench ct routes out/patient --lesion nodule --write out/patient/planned.toml",
         after_long_help = ROUTES_HELP
     )]
     Routes(Box<RoutesArguments>),
-    /// Synthetic CT of a phantom, with the truth beside it.
+    /// Synthesise a CT of a phantom, with its ground truth.
     #[command(
         after_help = "Example: needlebench ct synth scenarios/supine_suite.toml --out out/ct --preset biopsy --markers ct-sphere",
         after_long_help = SYNTH_HELP
@@ -47,7 +47,7 @@ enum CtCommand {
     Synth(Box<SynthArguments>),
 }
 
-/// Runs what is asked for of a CT.
+/// Runs a subcommand of `ct`.
 pub(crate) fn ct(arguments: &CtArguments) -> Result<ExitStatus, Failure> {
     match &arguments.command {
         CtCommand::Info(arguments) => info(arguments),

@@ -9,25 +9,26 @@ use nalgebra::Vector3;
 use needlebench_bench::ct::{BuiltFolder, SCENARIO_FILE};
 use needlebench_bench::routes::{
     RoutePlan, RouteTask, SOLID_DIRECTIONS, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free,
-    plan_routes,
+    plan_routes, rank,
 };
 use needlebench_bench::suggest::SuggestError;
 use needlebench_bench::{Control, Stop};
-use needlebench_cell::scenario::{GoalSection, Target};
-use needlebench_cell::{
-    Finding, OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, load_open_scenario,
-    read_text, resolve_scenario,
-};
 use needlebench_imaging::Remark;
+use needlebench_input::{Finding, read_text};
 use needlebench_report::files::{Folder, write_route_maps};
 use needlebench_report::table::routes::routes_text;
-use needlebench_report::{layout, write_atomically};
+use needlebench_report::write_atomically;
+use needlebench_scenario::scenario::{GoalSection, Target};
+use needlebench_scenario::{
+    OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, load_open_scenario, resolve_scenario,
+};
+use needlebench_show::layout;
 use serde::Serialize;
 
 use crate::arguments::{PicturesArguments, RobotArguments};
 use crate::command::record_plan::Three;
 use crate::command::results_folder::prepare_folder;
-use crate::command::suggest::{ChosenEntry, set_entries, unplaced};
+use crate::command::suggest::{ChosenEntry, set_entries, unplaced, write_scenario};
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
@@ -35,19 +36,20 @@ use crate::interrupts::{threads, watch_interrupts};
 use crate::output::shown;
 use crate::progress::TerminalProgress;
 
-/// What `ct routes --help` says after the options.
+/// What `ct routes --help` prints after the options.
 pub(crate) const ROUTES_HELP: &str = "\
 Example: needlebench ct routes out/patient --lesion nodule --write out/patient/planned.toml
 
-DIR is a folder of `ct build`: routes are planned in its voxels, and with the robot if the scan was registered to it. For a
-scenario they are planned among the solids of its phantom.
+DIR is a folder of `ct build`: needle paths are planned in its voxels, and with the robot if the scan is registered to
+it. For a scenario they are planned among the solids of its phantom.
 
-Rules and odds ratios are those of the goal's [goals.route], with the defaults of `needlebench schema scenario`.
+Rules and odds ratios are those of [goals.route], with the defaults of `needlebench schema scenario`.
 
-Writes routes.json, with every direction that was judged and the rule that refuses it, and an entry map for each target.
+Writes routes.json, with every evaluated direction and the rule that rejects it, and an entry map for each target.
 
-Exit status: 0 there is a route for every target, served in as many configurations as the scenario wants, or, where no robot
-is asked (robot_not_asked says why), free by the patient alone; 1 there is not.";
+Exit status: 0 every target has a needle path that is feasible in the number of configurations that the scenario
+requires, one of them recommended; or, if the robot is not checked (robot_not_asked has the reason), a path admissible
+for the patient alone. 1 otherwise.";
 
 #[derive(Debug, Args)]
 #[expect(
@@ -55,42 +57,42 @@ is asked (robot_not_asked says why), free by the patient alone; 1 there is not."
     reason = "switches that do not depend on each other"
 )]
 pub(crate) struct RoutesArguments {
-    /// Folder that `ct build` has written, or a scenario.
+    /// Folder written by `ct build`, or a scenario.
     #[arg(value_name = "DIR|SCENARIO")]
     path: PathBuf,
-    /// A target: mm of the scan (left, posterior, superior); of a scenario without a scan, from mid-chest.
+    /// Target point, mm in the scan (left, posterior, superior); for a scenario without a scan, from mid-chest.
     #[arg(
         long,
         value_name = "X,Y,Z",
-        allow_negative_numbers = true,
+        allow_hyphen_values = true,
         conflicts_with = "lesion"
     )]
     target: Option<Three>,
-    /// A lesion, by name; all goals of the scenario if neither is given.
+    /// Target lesion, by name [default without --target: all goals of the scenario].
     #[arg(long, value_name = "NAME")]
     lesion: Option<String>,
-    /// Directions to judge, evenly over the sphere: 20 000 in voxels and 4000 among solids if left out.
+    /// Number of directions to evaluate, evenly over the sphere [default: 20 000 in voxels, 4000 among solids].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     directions: Option<u32>,
-    /// Ask the robot where the room has it, although the scan is not registered to it.
+    /// Check the robot at the room's base placement although the scan is not registered to it.
     #[arg(long)]
     assume_room: bool,
-    /// Ask no robot: routes by the patient alone.
+    /// Do not check the robot: plan for the patient alone.
     #[arg(long, conflicts_with = "assume_room")]
     no_robot: bool,
-    /// Write the scenario with the chosen routes as entries to a file.
+    /// Write the scenario with the entries of the chosen paths to a file.
     #[arg(long, value_name = "FILE")]
     write: Option<PathBuf>,
-    /// With --write: replace a file that is there.
+    /// With --write: replace an existing file.
     #[arg(long, requires = "write")]
     force: bool,
-    /// Folder for routes.json and entry maps; that of the patient if left out, and for a scenario none are written.
+    /// Folder for routes.json and entry maps [default: the patient's folder; none for a scenario].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print one JSON document instead of the tables; every direction is in the file alone.
+    /// Print one JSON document instead of the tables; the directions are in the file only.
     #[arg(long)]
     json: bool,
-    /// Threads; the number of cores if left out. Results do not depend on it.
+    /// Number of threads [default: all cores]; does not affect results.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     jobs: Option<u16>,
     #[command(flatten)]
@@ -121,7 +123,7 @@ impl Found {
     fn answer(&self) -> RoutesAnswer<'_> {
         RoutesAnswer {
             schema_version: 1,
-            ok: self.is_complete(),
+            ok: self.is_served(),
             findings: &[],
             scenario: Some(&self.name),
             targets: &self.plans,
@@ -130,12 +132,22 @@ impl Found {
         }
     }
 
+    /// Whether every target has a needle path.
     fn is_complete(&self) -> bool {
         self.plans.iter().all(|plan| plan.chosen.is_some())
     }
+
+    /// Whether every target has a needle path and, if the robot was checked, a configuration for it.
+    fn is_served(&self) -> bool {
+        let chosen = |plan: &RoutePlan| {
+            let chosen = plan.chosen.as_ref()?;
+            Some(plan.robot_not_asked.is_some() || chosen.configuration.is_some())
+        };
+        self.plans.iter().all(|plan| chosen(plan) == Some(true))
+    }
 }
 
-/// Plans routes.
+/// Plans needle paths.
 pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus, Failure> {
     let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(arguments.json);
@@ -173,14 +185,14 @@ pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus, Failure>
     } else {
         print_text(&in_words(arguments, &found, files.as_deref()))?;
     }
-    Ok(if found.is_complete() {
+    Ok(if found.is_served() {
         ExitStatus::Success
     } else {
         ExitStatus::CriterionFailed
     })
 }
 
-/// Writes `routes.json` and the maps; the folder that they are in, if they are wanted.
+/// Writes `routes.json` and the maps; returns their folder, if there is one.
 fn written_files(arguments: &RoutesArguments, found: &Found) -> Result<Option<PathBuf>, Failure> {
     let own = arguments.path.is_dir().then(|| arguments.path.clone());
     let Some(folder) = arguments.out.clone().or(own) else {
@@ -219,7 +231,7 @@ fn in_words(arguments: &RoutesArguments, found: &Found, folder: Option<&Path>) -
             shown(path)
         )),
         (Some(path), None) => last.push(format!(
-            "not written: {}, since not every target has a route",
+            "not written: {}, because not every target has a needle path",
             shown(path)
         )),
         (None, None) => {}
@@ -231,7 +243,7 @@ fn in_words(arguments: &RoutesArguments, found: &Found, folder: Option<&Path>) -
     texts.join("\n\n")
 }
 
-/// What routes are planned in.
+/// The patient that needle paths are planned in.
 struct Patient {
     scenario: PathBuf,
     resolved: ResolvedScenario,
@@ -264,7 +276,7 @@ impl Patient {
         })
     }
 
-    /// What routes are planned to.
+    /// The goals that needle paths are planned to.
     fn sections(&self, arguments: &RoutesArguments) -> Result<Vec<GoalSection>, Finding> {
         let file = &self.resolved.source.file;
         let target = match (&arguments.lesion, arguments.target) {
@@ -280,9 +292,12 @@ impl Patient {
                 let with_target = self.goals.iter().filter(|goal| goal.flange_pose.is_none());
                 let all: Vec<GoalSection> = with_target.cloned().collect();
                 if all.is_empty() {
-                    return Err(Finding::new(file, "it has no goal to plan a route to")
-                        .key("goals")
-                        .hint("name a target with --lesion NAME or --target X,Y,Z"));
+                    return Err(Finding::new(
+                        file,
+                        "the scenario has no goal to plan a needle path to",
+                    )
+                    .key("goals")
+                    .hint("name a target with --lesion NAME or --target X,Y,Z"));
                 }
                 return Ok(all);
             }
@@ -310,7 +325,7 @@ impl Patient {
         }
         match self.built.as_ref().and_then(BuiltFolder::not_registered) {
             Some(why) if !arguments.assume_room => WithRobot::No(format!(
-                "{why}; --assume-room asks the robot where the room has it"
+                "{why}; --assume-room checks the robot at the room's base placement"
             )),
             _ => WithRobot::Yes,
         }
@@ -371,24 +386,75 @@ fn find(
         remarks,
         written: None,
     };
-    found.written = written(arguments, &patient, &found, overrides)?;
+    let is_asked = found
+        .plans
+        .iter()
+        .any(|plan| plan.robot_not_asked.is_none());
+    if !is_asked && arguments.write.is_none() {
+        return Ok(found);
+    }
+    match planned(arguments, &patient, &found, overrides) {
+        Ok((edit, resolved)) => {
+            rank_by_runs(&resolved, &mut found, control)?;
+            if let Some(path) = arguments.write.as_ref().filter(|_| found.is_complete()) {
+                write_scenario(path, &edit)?;
+                found.written = Some(path.clone());
+            }
+        }
+        Err(findings) if arguments.write.is_some() && found.is_complete() => {
+            return Err(findings.into());
+        }
+        Err(findings) => {
+            let why = findings.first().map_or("", |first| &first.message);
+            for plan in &mut found.plans {
+                not_ranked(plan, why);
+            }
+        }
+    }
     Ok(found)
+}
+
+fn not_ranked(plan: &mut RoutePlan, why: &str) {
+    if let Some(chosen) = &mut plan.chosen
+        && plan.robot_not_asked.is_none()
+    {
+        chosen.leave_open(format!("the plan cannot be run: {why}"));
+    }
+}
+
+/// Adds what `run` recommends on the chosen paths, if the robot was checked. A plan that cannot be run keeps its paths.
+fn rank_by_runs(
+    resolved: &ResolvedScenario,
+    found: &mut Found,
+    control: &Control<'_>,
+) -> Result<(), Stop> {
+    for plan in &mut found.plans {
+        if plan.robot_not_asked.is_some() {
+            continue;
+        }
+        match rank(resolved, plan, control) {
+            Ok(()) => {}
+            Err(SuggestError::Interrupted) => return Err(Stop::Interrupted),
+            Err(error) => not_ranked(plan, &error.to_string()),
+        }
+    }
+    Ok(())
 }
 
 fn refuse_existing(arguments: &RoutesArguments) -> Result<(), Finding> {
     match &arguments.write {
         Some(path) if path.exists() && !arguments.force => Err(Finding::new(
             path.display().to_string(),
-            "there is such a file already",
+            "the file exists already",
         )
         .key("--write")
-        .hint("choose another name, or replace it with --force")),
+        .hint("choose another name, or add --force")),
         Some(path) => same_folder(&arguments.path, path),
         None => Ok(()),
     }
 }
 
-/// Refuses to write a scenario elsewhere than beside the one that it is made of: its paths are relative to that.
+/// Rejects a file that is not in the folder of the source scenario: its paths are relative to that folder.
 fn same_folder(from: &Path, to: &Path) -> Result<(), Finding> {
     let own = if from.is_dir() {
         Some(from)
@@ -405,27 +471,23 @@ fn same_folder(from: &Path, to: &Path) -> Result<(), Finding> {
     let beside = own.unwrap_or(Path::new("")).join("planned.toml");
     Err(Finding::new(
         to.display().to_string(),
-        "it has to be beside the scenario, whose paths are relative to it",
+        "the file must be in the scenario's folder: paths are relative to it",
     )
     .key("--write")
     .hint(format!("write {}", shown(&beside))))
 }
 
-/// Writes the scenario with the chosen routes, if that is wanted and all targets have one.
-fn written(
+/// The scenario with the chosen needle paths, as text and resolved.
+fn planned(
     arguments: &RoutesArguments,
     patient: &Patient,
     found: &Found,
     overrides: &Overrides,
-) -> Result<Option<PathBuf>, Stop> {
-    let Some(path) = arguments.write.as_ref().filter(|_| found.is_complete()) else {
-        return Ok(None);
-    };
-    let to = path.display().to_string();
+) -> Result<(ScenarioEdit, ResolvedScenario), Vec<Finding>> {
     let file = &patient.resolved.source.file;
-    let text =
-        read_text(&patient.scenario).map_err(|error| Finding::new(file, error.to_string()))?;
-    let mut edit = ScenarioEdit::new(file, &text)?;
+    let text = read_text(&patient.scenario)
+        .map_err(|error| vec![Finding::new(file, error.to_string())])?;
+    let mut edit = ScenarioEdit::new(file, &text).map_err(|finding| vec![finding])?;
     let chosen = found.plans.iter().filter_map(|plan| {
         Some(ChosenEntry {
             goal: &plan.goal,
@@ -434,11 +496,13 @@ fn written(
             direction_deg: plan.routes[plan.chosen.as_ref()?.route].direction_deg,
         })
     });
-    set_entries(&mut edit, &patient.goals, chosen, "ct routes")?;
-    edit.name_after(path)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    resolve_scenario(&to, edit.text(), folder, overrides).map_err(unplaced)?;
-    write_atomically(path, edit.text().as_bytes())
-        .map_err(|error| Finding::new(&to, format!("cannot be written: {error}")).key("--write"))?;
-    Ok(Some(path.clone()))
+    let set = set_entries(&mut edit, &patient.goals, chosen, "ct routes");
+    set.map_err(|finding| vec![finding])?;
+    let path = arguments.write.as_deref().unwrap_or(&patient.scenario);
+    if arguments.write.is_some() {
+        edit.name_after(path).map_err(|finding| vec![finding])?;
+    }
+    let (to, folder) = (path.display().to_string(), path.parent());
+    let resolved = resolve_scenario(&to, edit.text(), folder.unwrap_or(Path::new("")), overrides);
+    Ok((edit, resolved.map_err(unplaced)?))
 }

@@ -10,15 +10,16 @@ use needlebench_bench::ct::{
     CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan, marker_list,
 };
 use needlebench_bench::progress::Progress;
-use needlebench_cell::phantom::{Phantom, PhantomParameters, SIZE_PRESETS};
-use needlebench_cell::scenario::MarkerKind;
-use needlebench_cell::{FileKind, Finding, ResolvedScenario, load_scenario, read_text};
 use needlebench_imaging::ImagingError;
-use needlebench_imaging::synth::{
+use needlebench_imaging::write::{DicomSeries, write_dicom, write_label_nifti, write_nifti};
+use needlebench_input::{FileKind, Finding, read_text};
+use needlebench_phantom::{Phantom, PhantomParameters, SIZE_PRESETS};
+use needlebench_report::write_atomically;
+use needlebench_scenario::scenario::MarkerKind;
+use needlebench_scenario::{ResolvedScenario, load_scenario};
+use needlebench_synthesis::{
     Kernel, Noise, Overshoot, ScanPreset, Scanner, SliceProfile, Streaks, label, synthesise_watched,
 };
-use needlebench_imaging::write::{DicomSeries, write_dicom, write_label_nifti, write_nifti};
-use needlebench_report::write_atomically;
 use serde::Serialize;
 
 use crate::arguments::RobotArguments;
@@ -30,18 +31,18 @@ use crate::interrupts::watch_interrupts;
 use crate::output::shown;
 use crate::progress::TerminalProgress;
 
-/// What `ct synth --help` says after the options.
+/// What `ct synth --help` prints after the options.
 pub(crate) const SYNTH_HELP: &str = "\
 Example: needlebench ct synth scenarios/supine_suite.toml --out out/ct --preset biopsy --markers ct-sphere
 
 Writes into DIR:
   ct.nii.gz, dicom/   the volume, as --format says
-  labels.nii.gz       what is at the centre of each voxel; its names are in labels.json
+  labels.nii.gz       label map by voxel centres; names in labels.json
   truth.json          scanner, materials, transforms (robot_from_ct of a scenario), lesions, markers; m and rad
   lesions.json, markers.json
-  marker_list.toml    spheres as the robot has touched them, for `ct build --markers`; of a phantom alone by its drawing
+  marker_list.toml    spheres as digitised with the robot, for `ct build --markers`; of a phantom alone, in its drawing
 
-Frame ct is the patient's LPS. The same file, options and seed give the same bytes.";
+Frame ct is the patient's LPS frame. The same file, options and seed give the same bytes.";
 
 #[derive(Debug, Args)]
 #[expect(
@@ -49,91 +50,91 @@ Frame ct is the patient's LPS. The same file, options and seed give the same byt
     reason = "each is a switch of the command line"
 )]
 pub(crate) struct SynthArguments {
-    /// Scenario with a phantom, file of a phantom's sizes, or a shipped size such as male-p50-supine.
+    /// Scenario with a phantom, file of phantom sizes, or a bundled size, e.g. male-p50-supine.
     #[arg(value_name = "SCENARIO|PHANTOM")]
     subject: PathBuf,
-    /// Folder for the volume and its truth.
+    /// Folder for the volume and its ground truth.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Slices: 1 mm, 2.5 mm, 5 mm, or 5 mm every 2.5 mm.
+    /// Slice thickness and spacing: 1 mm, 2.5 mm, 5 mm, or 5 mm every 2.5 mm.
     #[arg(long, value_enum, default_value = "thin")]
     preset: PresetArgument,
-    /// What the volume is written as.
+    /// File format of the volume.
     #[arg(long, value_enum, default_value = "nifti")]
     format: FormatArgument,
     /// Seed of the noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Reconstruction kernel: blur and noise are its own unless they are given.
+    /// Reconstruction kernel; sets blur and noise unless they are given.
     #[arg(long, value_enum, default_value = "smooth")]
     kernel: KernelArgument,
-    /// Thickness of the slices, mm; the preset's if left out.
+    /// Slice thickness, mm [default: by preset].
     #[arg(long, value_name = "MM", value_parser = positive)]
     thickness_mm: Option<f64>,
-    /// Distance between slices, mm; the preset's if left out.
+    /// Slice spacing, mm [default: by preset].
     #[arg(long, value_name = "MM", value_parser = positive)]
     increment_mm: Option<f64>,
-    /// Sensitivity over the thickness.
+    /// Slice sensitivity profile.
     #[arg(long, value_enum, default_value = "box")]
     profile: ProfileArgument,
-    /// Columns and rows of a slice.
+    /// Number of columns and of rows of a slice.
     #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u16).range(16..=4096))]
     pixels: u16,
-    /// Distance between pixels, mm; 0.7, or what the body needs to fit, if left out.
+    /// Pixel spacing, mm [default: 0.7, or larger if the body requires it].
     #[arg(long, value_name = "MM", value_parser = positive)]
     pixel_mm: Option<f64>,
-    /// Lowest and highest slice along the patient, mm of ct; the whole chest if left out.
+    /// Lowest and highest slice along the patient, mm in ct [default: the whole chest].
     #[arg(long, value_name = "LOW,HIGH", value_parser = numbers::<2>, allow_hyphen_values = true)]
     range_mm: Option<Numbers<2>>,
-    /// Standard deviation of the noise in the middle at 1 mm and dose 1, HU; 0 for none.
+    /// Standard deviation of the noise at the centre, for 1 mm slices and dose 1, HU; 0 for none [default: by kernel].
     #[arg(long, value_name = "HU", value_parser = not_negative)]
     noise: Option<f64>,
-    /// Dose, of the usual one: noise falls with its root, and with that of the thickness.
+    /// Relative dose; noise scales with 1/sqrt(dose x slice thickness).
     #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = positive)]
     dose: f64,
-    /// Standard deviation of the blur in the slice, mm; 0 for none.
+    /// Standard deviation of the in-plane blur, mm; 0 for none [default: by kernel].
     #[arg(long, value_name = "MM", value_parser = not_negative)]
     blur_mm: Option<f64>,
-    /// Edges overshoot, as with edge-enhancing kernels.
+    /// Add edge overshoot, as of edge-enhancing kernels.
     #[arg(long)]
     overshoot: bool,
-    /// Dense parts leave streaks.
+    /// Add streak artefacts.
     #[arg(long)]
     streaks: bool,
-    /// Tilt of the gantry, deg: positive ones lean the slices' lower ends towards the feet.
+    /// Gantry tilt, deg; positive: the lower ends of the slices lean towards the feet.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = tilt, allow_hyphen_values = true)]
     tilt: f64,
-    /// Turn of the patient about the long axis, away from how he lies, deg.
+    /// Rotation of the patient about the long axis, relative to the patient position, deg.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = finite, allow_hyphen_values = true)]
     turn: f64,
-    /// Place of the phantom's origin in ct, mm.
+    /// Position of the phantom's origin in ct, mm.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
     shift_mm: Option<Numbers<3>>,
-    /// To which sides of the patient columns, rows and slices run: L or R, P or A, S or I.
+    /// Voxel axis orientation: patient sides towards which columns, rows and slices increase, L or R, P or A, S or I.
     #[arg(long, value_name = "LPS", default_value = "LPS", value_parser = axes)]
     axes: [bool; 3],
-    /// Markers: as the scenario or the file has them if left out.
+    /// Kind of markers [default: that of the scenario or file].
     #[arg(long, value_enum)]
     markers: Option<MarkersArgument>,
-    /// Hounsfield units of vessels: 150 to 300 with contrast medium; 45 if left out.
+    /// Hounsfield units of vessels; 150 to 300 with contrast medium [default: 45].
     #[arg(long, value_name = "HU", value_parser = finite)]
     vessels: Option<f64>,
-    /// Standard deviation along each axis of the places in marker_list.toml, mm.
-    #[arg(long, value_name = "MM", default_value_t = 0.3, value_parser = positive)]
+    /// Fiducial localisation error of the positions in marker_list.toml: standard deviation per axis, mm.
+    #[arg(long = "fle-sd-mm", alias = "touch-mm", value_name = "MM", default_value_t = 0.3, value_parser = positive)]
     touch_mm: f64,
-    /// No bed under the patient.
-    #[arg(long)]
+    /// Leave out the couch under the patient.
+    #[arg(long = "no-couch", alias = "no-bed")]
     no_bed: bool,
-    /// The corners outside the scanner's circle are seen too.
+    /// Keep the corners outside the circular field of view.
     #[arg(long)]
     no_circle: bool,
-    /// No label map.
+    /// Do not write the label map.
     #[arg(long)]
     no_labels: bool,
-    /// Print what was made as one JSON document.
+    /// Print one JSON document.
     #[arg(long)]
     json: bool,
-    /// Threads; the number of cores if left out. Results do not depend on it.
+    /// Number of threads [default: all cores]; does not affect results.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     jobs: Option<u16>,
     #[command(flatten)]
@@ -165,17 +166,17 @@ enum KernelArgument {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ProfileArgument {
-    /// All of the thickness alike.
+    /// Uniform over the slice thickness.
     Box,
-    /// A Gaussian of that full width at half maximum.
+    /// Gaussian with the slice thickness as full width at half maximum.
     Bell,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum MarkersArgument {
-    /// Plastic discs, which CT does not tell from skin.
+    /// Plastic discs, isodense with skin.
     Disc,
-    /// The discs on foam with a sphere in it.
+    /// The discs on foam that contains a sphere.
     CtSphere,
 }
 
@@ -196,7 +197,7 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     if value > 0.0 {
         Ok(value)
     } else {
-        Err("it has to be above 0".to_owned())
+        Err("must be above 0".to_owned())
     }
 }
 
@@ -205,7 +206,7 @@ fn not_negative(text: &str) -> Result<f64, String> {
     if value >= 0.0 {
         Ok(value)
     } else {
-        Err("it has to be 0 or more".to_owned())
+        Err("must be 0 or more".to_owned())
     }
 }
 
@@ -216,7 +217,7 @@ fn tilt(text: &str) -> Result<f64, String> {
     if value.abs() <= MOST_DEG {
         Ok(value)
     } else {
-        Err(format!("it has to be within {MOST_DEG} deg"))
+        Err(format!("must be within +-{MOST_DEG} deg"))
     }
 }
 
@@ -224,10 +225,10 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Result<Numbers<N>, String> 
     let values: Vec<f64> = text.split(',').map(finite).collect::<Result<_, _>>()?;
     <[f64; N]>::try_from(values)
         .map(Numbers)
-        .map_err(|values| format!("{} numbers, not {N}", values.len()))
+        .map_err(|values| format!("expected {N} numbers, got {}", values.len()))
 }
 
-/// Whether each axis runs against that of `ct`.
+/// Whether each axis is opposite to that of `ct`.
 fn axes(text: &str) -> Result<[bool; 3], String> {
     const SIDES: [[char; 2]; 3] = [['L', 'R'], ['P', 'A'], ['S', 'I']];
     let letters: Vec<char> = text.to_ascii_uppercase().chars().collect();
@@ -239,16 +240,16 @@ fn axes(text: &str) -> Result<[bool; 3], String> {
     flipped
         .filter(|_| letters.len() == 3)
         .and_then(|flipped| flipped.try_into().ok())
-        .ok_or_else(|| "three letters, the first L or R, then P or A, then S or I".to_owned())
+        .ok_or_else(|| "expected three letters: L or R, then P or A, then S or I".to_owned())
 }
 
-/// What is scanned.
+/// The scanned object.
 enum Subject {
     Scenario(Box<ResolvedScenario>),
     Phantom(Box<Phantom>),
 }
 
-/// What was made, for programs.
+/// The answer as JSON.
 #[derive(Debug, Serialize)]
 struct Made<'m> {
     schema_version: u32,
@@ -265,7 +266,7 @@ struct Listed<'l, T> {
     list: std::collections::BTreeMap<&'static str, &'l [T]>,
 }
 
-/// Makes a synthetic CT.
+/// Synthesises a CT.
 pub(crate) fn synth(arguments: &SynthArguments) -> Result<ExitStatus, Failure> {
     let subject = subject(arguments)?;
     let scan = described(arguments, &subject)?;
@@ -280,7 +281,7 @@ pub(crate) fn synth(arguments: &SynthArguments) -> Result<ExitStatus, Failure> {
             Ok(ExitStatus::Success)
         }
         Err(ImagingError::Interrupted) => Err(Failure::interrupted(
-            "interrupted: what was not complete was not written",
+            "interrupted: incomplete files were not written",
         )),
         Err(ImagingError::Refused {
             place,
@@ -321,7 +322,7 @@ fn subject(arguments: &SynthArguments) -> Result<Subject, Failure> {
 fn build(
     mut parameters: PhantomParameters,
     arguments: &SynthArguments,
-) -> Result<Subject, needlebench_cell::phantom::PhantomError> {
+) -> Result<Subject, needlebench_phantom::PhantomError> {
     if let Some(kind) = arguments.markers {
         parameters.marker_kind = kind.into();
     }
@@ -361,12 +362,13 @@ fn described(arguments: &SynthArguments, subject: &Subject) -> Result<SyntheticS
                 ),
                 _ => None,
             };
-            let mut subject = CtSubject::of_scenario(path, resolved)
-                .ok_or_else(|| refused("it has no phantom to scan".to_owned()).key("phantom"))?;
+            let mut subject = CtSubject::of_scenario(path, resolved).ok_or_else(|| {
+                refused("the scenario has no phantom to scan".to_owned()).key("phantom")
+            })?;
             if let Some(phantom) = &remade {
                 if !resolved.phantom_parts.is_empty() {
                     return Err(refused(
-                        "it has parts from files; --markers is for the model's own phantom"
+                        "its phantom has parts from files; --markers applies to the built-in phantom only"
                             .to_owned(),
                     )
                     .key("phantom.parts")
@@ -443,7 +445,7 @@ fn scanner(arguments: &SynthArguments, thickness_m: f64) -> Scanner {
     }
 }
 
-/// Makes and writes volume and labels; the names of the files.
+/// Synthesises and writes volume and labels; returns the names of the files.
 fn make(
     arguments: &SynthArguments,
     scan: &SyntheticScan,
@@ -512,7 +514,7 @@ fn series(arguments: &SynthArguments, scan: &SyntheticScan) -> DicomSeries {
     }
 }
 
-/// Writes the truth beside the volume, and says what was made.
+/// Writes the ground truth beside the volume, and prints a summary.
 fn write_truth(
     out: &Path,
     scan: &SyntheticScan,
@@ -593,7 +595,7 @@ fn said(out: &Path, scan: &SyntheticScan, files: &[String]) -> String {
         || "no noise".to_owned(),
         |noise| {
             format!(
-                "noise {:.1} HU in the middle",
+                "noise {:.1} HU at the centre",
                 noise.in_middle_hu(truth.scanner.slice_thickness_m)
             )
         },
@@ -604,19 +606,19 @@ fn said(out: &Path, scan: &SyntheticScan, files: &[String]) -> String {
             truth.subject
         ),
         format!(
-            "slices of {} mm, blur {} mm, {noise}, seed {}",
+            "slice thickness {} mm, blur {} mm, {noise}, seed {}",
             1e3 * truth.scanner.slice_thickness_m,
             1e3 * truth.scanner.psf_sigma_m,
             truth.seed
         ),
         format!(
-            "{} lesions, {} markers, {seen} of them with a sphere that CT sees",
+            "{} lesions, {} markers, {seen} of them with a sphere visible in CT",
             truth.lesions.len(),
             truth.markers.len()
         ),
     ];
     if seen == 0 && !truth.markers.is_empty() {
-        lines.push("CT does not tell these markers from skin: `--markers ct-sphere`, or `markers = \"ct_sphere\"` under [phantom]".to_owned());
+        lines.push("these markers are isodense with skin; use `--markers ct-sphere`, or `markers = \"ct_sphere\"` under [phantom]".to_owned());
     }
     lines.push(format!("results: {} ({})", shown(out), files.join(", ")));
     lines.join("\n")
@@ -643,7 +645,7 @@ mod tests {
         );
         assert_eq!(
             numbers::<2>("1,2,3").map(|it| it.0),
-            Err("3 numbers, not 2".to_owned())
+            Err("expected 2 numbers, got 3".to_owned())
         );
         assert!(numbers::<2>("1,nan").is_err());
     }

@@ -1,14 +1,16 @@
-//! Exports of one motion: of a goal in a configuration, by an engine.
+//! Exports of one motion, to a goal in a configuration, by an engine.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use needlebench_bench::Control;
 use needlebench_bench::motion::{MotionChoice, NoMotion, WorkingMotion};
-use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Finding, ResolvedScenario};
-use needlebench_export::{ExportError, ExportedFile, Motion, TrajectoryNotation};
-use needlebench_export::{mcap, motion_script, trajectory};
+use needlebench_export::{
+    ExportError, ExportedFile, Motion, TrajectoryNotation, mcap, motion_script, trajectory,
+};
+use needlebench_input::Finding;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::scenario::EngineName;
 
 use super::{ExportArguments, Format, configuration_named, finish, place};
 use crate::arguments::EngineArgument;
@@ -19,7 +21,7 @@ use crate::progress::TerminalProgress;
 
 use super::super::results_folder::prepare_folder;
 
-/// Engine that moves what is exported, where nobody names one: it needs nothing besides the program.
+/// Default engine: it has no requirements besides the program.
 const ENGINE: &str = "rapier";
 
 /// Notations of a trajectory with the extensions of their files.
@@ -30,7 +32,7 @@ const NOTATIONS: [(&str, TrajectoryNotation); 4] = [
     ("csv", TrajectoryNotation::Csv),
 ];
 
-/// Runs the goal, and writes the motion that is wanted.
+/// Runs the goal and writes the requested motion.
 pub(super) fn export(
     arguments: &ExportArguments,
     resolved: &ResolvedScenario,
@@ -58,7 +60,7 @@ pub(super) fn export(
             status: ExitStatus::EnvironmentFailed,
             message: format!("the engine failed: {message}"),
         },
-        NoMotion::Interrupted => Failure::interrupted("interrupted: there is no export"),
+        NoMotion::Interrupted => Failure::interrupted("interrupted: nothing was exported"),
     })?;
     let motion = Motion::of(&working);
     let files = files(arguments.format, &motion, named.as_ref())
@@ -87,7 +89,7 @@ fn named(
     if arguments.format == Format::Trajectory && !known {
         let finding = Finding::new(
             out.display().to_string(),
-            "a trajectory is written as JSON, YAML or CSV, by the extension of its file",
+            "a trajectory is written as JSON, YAML or CSV, selected by the file extension",
         );
         return Err(finding
             .key("--out")
@@ -107,7 +109,7 @@ fn choice(arguments: &ExportArguments) -> Result<MotionChoice, Finding> {
         Some([engine]) => engine.clone(),
         Some(several) => {
             let message = format!(
-                "{} engines are named, and one motion is of one",
+                "{} engines are named; a motion requires exactly one",
                 several.len()
             );
             let finding = Finding::new("the command line", message).key("--engine");
@@ -122,7 +124,7 @@ fn choice(arguments: &ExportArguments) -> Result<MotionChoice, Finding> {
     })
 }
 
-/// The files: the one that is named, or those of goal and configuration in a folder of their own, which a run leaves alone.
+/// The files: the named one, or those of goal and configuration in a separate folder, which a run does not modify.
 fn files(
     format: Format,
     motion: &Motion<'_>,

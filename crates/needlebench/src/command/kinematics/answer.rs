@@ -1,4 +1,4 @@
-//! What `ik` and `fk` answer, as JSON and as tables.
+//! The answers of `ik` and `fk`, as JSON and as tables.
 
 use std::collections::BTreeMap;
 
@@ -54,15 +54,15 @@ pub(super) struct IkAnswer {
     #[serde(flatten)]
     pub arm: ArmAnswer,
     pub method: &'static str,
-    /// By how much a touching row may miss the pose.
+    /// Pose tolerance for boundary solutions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance_rad: Option<f64>,
-    /// Postures that reproduce the pose.
+    /// Solutions.
     pub solutions: Vec<SolutionAnswer>,
     pub count: usize,
-    /// Postures that do not, nearest first.
+    /// Postures that do not reach the pose, nearest first.
     pub nearest: Vec<SolutionAnswer>,
     pub unreachable: Vec<UnreachableAnswer>,
     pub certificate: &'static str,
@@ -78,7 +78,7 @@ pub(super) struct SolutionAnswer {
     pub free_joint: Option<&'static str>,
     pub kind: &'static str,
     pub merged: bool,
-    /// The pose as it was given misses this row, by no more than the tolerance.
+    /// A boundary solution: it misses the given pose by no more than the tolerance.
     pub touching: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<u32>,
@@ -103,7 +103,7 @@ impl SolutionAnswer {
     fn remarks(&self) -> String {
         let mut remarks = Vec::new();
         if self.kind == kind_name(SolutionKind::Nearest) {
-            remarks.push("nearest, not a solution".to_owned());
+            remarks.push("nearest posture, not a solution".to_owned());
         }
         if !self.within_limits {
             remarks.push("outside limits".to_owned());
@@ -112,10 +112,10 @@ impl SolutionAnswer {
             remarks.push(format!("{joint} is free"));
         }
         if self.merged {
-            remarks.push("merged".to_owned());
+            remarks.push("coincident solutions".to_owned());
         }
         if self.touching {
-            remarks.push("touching".to_owned());
+            remarks.push("boundary solution".to_owned());
         }
         if let Some(iterations) = self.iterations {
             let plural = if iterations == 1 { "" } else { "s" };
@@ -127,7 +127,7 @@ impl SolutionAnswer {
 
 impl IkAnswer {
     pub(super) fn text(&self) -> String {
-        let mut table = needlebench_report::plain_table(&[
+        let mut table = needlebench_show::plain_table(&[
             "configuration",
             "q1\n(rad)",
             "q2\n(rad)",
@@ -150,17 +150,14 @@ impl IkAnswer {
         for unreachable in &self.unreachable {
             let mut cells = vec![unreachable.label.to_owned()];
             cells.extend((0..8).map(|_| "-".to_owned()));
-            cells.push(format!(
-                "unreachable: {} missing",
-                length(unreachable.missing_m)
-            ));
+            cells.push(format!("out of reach by {}", length(unreachable.missing_m)));
             table.add_row(cells);
         }
         let (arm, count, certificate) = (self.arm.text(), self.count, self.certificate);
         let touching = match (self.tolerance_m, self.tolerance_rad) {
             (Some(m), Some(rad)) if self.solutions.iter().any(|row| row.touching) => {
                 let m = length(m);
-                format!("\ntouching: the pose misses the row by up to {m} and {rad:.1e} rad")
+                format!("\nboundary solution: reaches the pose to within {m} and {rad:.1e} rad")
             }
             _ => String::new(),
         };
@@ -237,7 +234,7 @@ impl FkAnswer {
     }
 
     pub(super) fn text(&self) -> String {
-        let mut table = needlebench_report::plain_table(&[
+        let mut table = needlebench_show::plain_table(&[
             "frame",
             "position\nx (m)",
             "\ny (m)",

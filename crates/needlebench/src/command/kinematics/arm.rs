@@ -1,21 +1,22 @@
-//! The arm that `ik` and `fk` are asked about.
+//! The arm of `ik` and `fk`.
 
 use std::path::Path;
 
-use needlebench_cell::{
-    AppliedCalibration, Calibration, Finding, MOVING_LINK_LABELS, Robot, load_robot,
-};
+use needlebench_cell::Robot;
+use needlebench_input::Finding;
 use needlebench_kinematics::{Chain, JointLimits, Joints, LimitPolicy, UrModel};
+use needlebench_robot::{AppliedCalibration, Calibration, MOVING_LINK_LABELS, RobotDescription};
+use needlebench_scenario::load_robot;
 
 use super::super::urdf_overrides;
 use crate::arguments::ArmArguments;
 
-/// What kinematics need of an arm.
+/// The kinematic data of an arm.
 #[derive(Debug, Clone)]
 pub struct KinematicArm {
-    /// The maker's name where it is a known arm.
+    /// The manufacturer's name if it is a known arm.
     pub name: String,
-    /// Where it comes from, for complaints.
+    /// Its source, for error messages.
     pub file: String,
     /// Its links.
     pub chain: Chain,
@@ -23,29 +24,28 @@ pub struct KinematicArm {
     pub limits: JointLimits,
     /// Short names of the moving links.
     pub links: [String; 6],
-    /// The calibration that it has.
+    /// Its calibration.
     pub calibration: Option<AppliedCalibration>,
 }
 
 impl KinematicArm {
     pub(super) fn new(arguments: &ArmArguments) -> Result<Self, Finding> {
-        match arguments.arm {
-            Some(model) => Self::of_model(model, arguments.robot.calibration.as_deref()),
-            None => Ok(Self::of_robot(&load_robot(&urdf_overrides(
-                &arguments.robot,
-            )?)?)),
+        if let Some(model) = arguments.arm {
+            return Self::of_model(model, arguments.robot.calibration.as_deref());
         }
+        let loaded = load_robot(&urdf_overrides(&arguments.robot)?)?;
+        Ok(Self::of_robot(&loaded.robot, &loaded.description))
     }
 
-    /// That of a robot.
-    pub fn of_robot(robot: &Robot) -> Self {
+    /// The data of a robot.
+    pub fn of_robot(robot: &Robot, description: &RobotDescription) -> Self {
         Self {
-            name: robot.arm_name(),
-            file: robot.source.file.clone(),
+            name: description.arm_name.clone(),
+            file: description.source.file.clone(),
             chain: robot.chain,
             limits: robot.limits,
             links: robot.links.each_ref().map(|link| link.name.clone()),
-            calibration: robot.calibration.clone(),
+            calibration: description.calibration.clone(),
         }
     }
 

@@ -1,16 +1,18 @@
-//! The pose that `ik` is asked for.
+//! The target pose of `ik`.
 
 use std::f64::consts::TAU;
 use std::path::Path;
 
 use nalgebra::Vector3;
-use needlebench_cell::{Finding, Robot, Roll};
+use needlebench_cell::Robot;
 use needlebench_clearance::ClearanceModel;
+use needlebench_input::Finding;
 use needlebench_kinematics::ik::Tolerance;
 use needlebench_kinematics::{
     NotARotation, Pose, pose_from_matrix, pose_from_rotation_vector, rotation_vector,
 };
 use needlebench_planning::Planner;
+use needlebench_scenario::Roll;
 
 use super::super::urdf_overrides;
 use super::IkArguments;
@@ -18,18 +20,18 @@ use super::arm::KinematicArm;
 use crate::arguments::{PoseMatrix, Six};
 use crate::failure::Failure;
 
-/// A coordinate beyond this is in another unit.
+/// A coordinate above this is in another unit.
 const FARTHEST_M: f64 = 10.0;
 
-/// What few digits leave open is taken for no more than that of four decimals, m and rad: who writes
-/// 0.3 means it.
+/// Upper limit of the tolerance that follows from the digits, m and rad: that of four decimals, because 0.3 is meant
+/// exactly.
 const MOST_DIGITS: f64 = 1e-4;
 
-/// A tolerance beyond this makes neighbouring postures one, m and rad.
+/// Above this tolerance neighbouring postures coincide, m and rad.
 const MOST_GIVEN: f64 = 1e-3;
 
-/// By how much the pose may be missed: as the argument says, or what the digits that were written
-/// leave open, but at least [`Tolerance::default`] and at most [`MOST_DIGITS`].
+/// The pose tolerance: that of the argument, or the resolution of the given digits, at least
+/// [`Tolerance::default`] and at most [`MOST_DIGITS`].
 pub(super) fn tolerance(arguments: &IkArguments) -> Result<Tolerance, Finding> {
     if let Some(given) = arguments.tolerance {
         if (0.0..=MOST_GIVEN).contains(&given) {
@@ -38,9 +40,9 @@ pub(super) fn tolerance(arguments: &IkArguments) -> Result<Tolerance, Finding> {
                 rad: given,
             });
         }
-        let message = format!("it is {given:?}, outside 0 to {MOST_GIVEN:?} m and rad");
+        let message = format!("{given:?} is outside 0 to {MOST_GIVEN:?} m and rad");
         return Err(Finding::new("--tolerance", message)
-            .hint("it is in metres and radians: 1e-6 is a micrometre and a microradian"));
+            .hint("the unit is metres and radians: 1e-6 is a micrometre and a microradian"));
     }
     // The most digits of any number tell how all are meant: 0.3 beside 0.244470 is exact.
     let finest = |half_units: &[f64]| half_units.iter().copied().fold(f64::INFINITY, f64::min);
@@ -82,11 +84,10 @@ fn of_vector(Six([x, y, z, rx, ry, rz], _): &Six) -> Result<Pose, Finding> {
     // The controller writes at most half a turn; a little over a whole one is still rounding.
     if angle_rad > 1.01 * TAU {
         let message = format!(
-            "the rotation vector is {angle_rad:.4} rad long, but a whole turn is {TAU:.4} rad"
+            "the length of the rotation vector is {angle_rad:.4} rad, above a full turn of {TAU:.4} rad"
         );
-        return Err(Finding::new("--pose", message).hint(
-            "rx, ry and rz are an axis times an angle in radians, as the controller shows them",
-        ));
+        return Err(Finding::new("--pose", message)
+            .hint("rx, ry and rz are axis times angle in radians, as shown by the controller"));
     }
     Ok(pose_from_rotation_vector(position_m, rotvec_rad))
 }
@@ -107,21 +108,21 @@ fn of_matrix(PoseMatrix(matrix, _): &PoseMatrix, nearest: bool) -> Result<Pose, 
 fn not_a_rotation(error: &NotARotation, position_m: &Vector3<f64>) -> Finding {
     if error.is_mirrored() {
         let message = format!(
-            "the matrix is mirrored: its determinant is {:.6}, a rotation's is 1",
+            "the matrix is mirrored: determinant {:.6}, 1 required for a rotation",
             error.determinant
         );
         return Finding::new("--matrix", message)
-            .hint("an axis has lost its sign, or two rows or columns are swapped");
+            .hint("an axis has the wrong sign, or two rows or columns are swapped");
     }
     let finding = Finding::new("--matrix", error.to_string());
     let Some(rotation) = error.nearest else {
-        return finding.hint("its columns do not span space, so that no rotation is near to it");
+        return finding.hint("its columns are linearly dependent, so there is no nearest rotation");
     };
     let [x, y, z] = (*position_m).into();
     let [rx, ry, rz] = rotation_vector(&rotation).into();
     finding.hint(format!(
-        "the nearest rotation is --pose {x:?},{y:?},{z:?},{rx:?},{ry:?},{rz:?}; to take it, give \
-         that or add --nearest-rotation"
+        "the nearest rotation is --pose {x:?},{y:?},{z:?},{rx:?},{ry:?},{rz:?}; to use it, give that or \
+         add --nearest-rotation"
     ))
 }
 
@@ -137,7 +138,7 @@ fn check_position(argument: &str, position_m: &Vector3<f64>) -> Result<(), Findi
 
 fn goal_pose(arguments: &IkArguments, path: &Path) -> Result<(KinematicArm, Pose), Failure> {
     let overrides = urdf_overrides(&arguments.arm.robot)?;
-    let resolved = needlebench_cell::load_scenario(path, &overrides)?;
+    let resolved = needlebench_scenario::load_scenario(path, &overrides)?;
     let name = arguments.goal.as_deref().unwrap_or_default();
     let Some(goal) = resolved.goals.iter().find(|goal| goal.name == name) else {
         let names: Vec<&str> = resolved
@@ -146,17 +147,23 @@ fn goal_pose(arguments: &IkArguments, path: &Path) -> Result<(KinematicArm, Pose
             .map(|goal| goal.name.as_str())
             .collect();
         let file = path.display().to_string();
-        return Err(Finding::new(file, format!("it has no goal `{name}`"))
-            .hint(format!("goals: {}", names.join(", ")))
-            .into());
+        return Err(
+            Finding::new(file, format!("the scenario has no goal `{name}`"))
+                .hint(format!("goals: {}", names.join(", ")))
+                .into(),
+        );
     };
     let model = ClearanceModel::new(&resolved.cell);
-    let planner = Planner::new(&resolved, &model)
-        .map_err(|error| Finding::new(&resolved.cell.robot.source.file, error.to_string()))?;
+    let planner = Planner::new(&resolved, &model).map_err(|error| {
+        Finding::new(&resolved.robot_description.source.file, error.to_string())
+    })?;
     let roll_rad = match goal.roll {
         Roll::Fixed(roll_rad) => roll_rad,
         Roll::Free => 0.0,
     };
     let pose = planner.base_link_from_flange(goal, roll_rad);
-    Ok((KinematicArm::of_robot(&resolved.cell.robot), pose))
+    Ok((
+        KinematicArm::of_robot(&resolved.cell.robot, &resolved.robot_description),
+        pose,
+    ))
 }

@@ -9,15 +9,15 @@ use needlebench_study::Shard;
 use crate::arguments::{PicturesArguments, RobotArguments, TableArguments};
 
 pub(crate) const STUDY_HELP: &str = "\
-A study is one TOML file: a scenario, factors that vary it, and what is asked of the results. Every case \
-has a number that decides everything about it.
+A study is one TOML file: a scenario, factors that vary it, and criteria. The number of a case determines all \
+its values.
 
-Writes DIR/NAME/results.parquet, summary.json, summary.md, report.html and study.json. An interrupted \
-study goes on with --resume.
+Writes DIR/NAME/results.parquet, summary.json, summary.md, report.html and study.json. --resume continues an \
+interrupted study.
 
-Shards may run on several machines; `merge` joins them. --launch writes the scripts for a cluster. A shard ends \
-with 0 if it is there, with 3 or 130 if it is worth asking for it again, with 2 if it is not. --status and \
---missing end with 0 if all is there, with 1 if it is not.
+Shards may run on several machines; `merge` joins them. --launch writes the scripts for a cluster. Shard exit \
+status: 0 complete, 3 or 130 retry, 2 do not retry. Exit status of --status and --missing: 0 all shards complete, \
+1 not.
 
 Example: needlebench study scenarios/studies/layouts.toml
 Example: needlebench study scenarios/studies/layouts.toml --case 1234
@@ -34,33 +34,33 @@ pub(crate) struct StudyArguments {
     /// Study file.
     #[arg(value_name = "STUDY")]
     pub study: PathBuf,
-    /// Folder for results; the study gets a folder of its name in it.
+    /// Folder for results; the study has a subfolder of its name.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
-    /// Go on with a study that was interrupted.
+    /// Continue an interrupted study.
     #[arg(long)]
     pub resume: bool,
-    /// Start without asking, however long it will take.
+    /// Start regardless of the expected time.
     #[arg(long)]
     pub yes: bool,
-    /// Compute one of N parts: 1/N to N/N. auto: the one that the array of Slurm, Kubernetes, PBS or AWS Batch
-    /// says, or NEEDLEBENCH_SHARD and NEEDLEBENCH_SHARDS, into DIR/K.
+    /// Compute one of N parts: 1/N to N/N. auto: that of the job array (Slurm, Kubernetes, PBS, AWS Batch) or of
+    /// NEEDLEBENCH_SHARD and NEEDLEBENCH_SHARDS, in DIR/K.
     #[arg(long, value_name = "K/N|auto")]
     pub shard: Option<ShardArgument>,
-    /// Say how far the shards in these folders are, or below them; also while they are computed.
+    /// Print the progress of the shards in or below these folders, also while they run.
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["resume", "shard", "case", "csv", "table"])]
     pub status: Vec<PathBuf>,
-    /// With --status: print only the numbers of the shards to start (again), as `sbatch --array` takes them.
+    /// With --status: print only the numbers of the shards to start or restart, in the format of `sbatch --array`.
     #[arg(long, requires = "status", conflicts_with = "json")]
     pub missing: bool,
-    /// Write scripts that compute the study in N shards: slurm:N, kubernetes:N, or local:N for N processes of
-    /// this machine; and print what to type. Nothing is started.
+    /// Write scripts that compute the study in N shards, slurm:N, kubernetes:N, or local:N for N processes on this
+    /// machine, and print the commands to start them. Nothing is started.
     #[arg(long, value_name = "WHAT:N", conflicts_with_all = ["resume", "shard", "status", "case", "csv", "table"])]
     pub launch: Option<LaunchRequest>,
-    /// Compute these cases alone and print their rows; nothing is written.
+    /// Compute these cases only and print their rows; nothing is written.
     #[arg(long, value_name = "ID", conflicts_with_all = ["resume", "shard", "csv", "table"])]
     pub case: Vec<u64>,
-    /// With --case: run it with engines, pictures and a page, as `run` does, into the study's folder.
+    /// With --case: run it like `run`, with engines, images and a page, in the study's folder.
     #[arg(long, requires = "case")]
     pub run: bool,
     #[command(flatten)]
@@ -71,12 +71,12 @@ pub(crate) struct StudyArguments {
     pub robot: RobotArguments,
 }
 
-/// A shard that was asked for.
+/// A requested shard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ShardArgument {
     /// This one.
     This(Shard),
-    /// The one that the environment says.
+    /// That of the environment.
     Auto,
 }
 
@@ -100,10 +100,10 @@ pub(crate) struct MergeArguments {
     /// Study file.
     #[arg(value_name = "STUDY")]
     pub study: PathBuf,
-    /// Folders of all its shards, those with the file `study.json`; or folders that they are in.
+    /// Folders of all shards (with the file `study.json`), or folders that contain them.
     #[arg(required = true, value_name = "SHARD")]
     pub shards: Vec<PathBuf>,
-    /// Folder for results; the study gets a folder of its name in it.
+    /// Folder for results; the study has a subfolder of its name.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
     #[command(flatten)]
@@ -112,29 +112,29 @@ pub(crate) struct MergeArguments {
     pub robot: RobotArguments,
 }
 
-/// What is made of a complete table, and how.
+/// Outputs of a complete table.
 #[derive(Debug, Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct StudyResultArguments {
-    /// Write results.csv too.
+    /// Also write results.csv.
     #[arg(long)]
     pub csv: bool,
     /// Print one JSON document instead of the tables.
     #[arg(long)]
     pub json: bool,
-    /// Print all tables, not only the answer and what it rests on.
+    /// Print all tables, not only the answer and its basis.
     #[arg(long)]
     pub wide: bool,
     /// Write JUnit XML of the study's criteria to this file.
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
-    /// Threads; the number of cores if left out. Results do not depend on it.
+    /// Number of threads [default: all cores]; does not affect results.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: Option<u16>,
-    /// Write no page.
+    /// Do not write the page.
     #[arg(long)]
     pub no_page: bool,
-    /// Show no progress.
+    /// Do not show progress.
     #[arg(long)]
     pub quiet: bool,
     #[command(flatten)]

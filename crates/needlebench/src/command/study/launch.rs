@@ -1,4 +1,4 @@
-//! `needlebench study --launch`: scripts for shards, and the lines to type.
+//! `needlebench study --launch`: scripts for shards, and the commands to start them.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use needlebench_bench::study::{
     Launch, LaunchFile, LaunchPlan, LaunchRequest, Launcher, PreparedStudy, StudyEvaluator, advice,
     launch_plan, time_per_case,
 };
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 use needlebench_report::files::write_atomically;
 use serde::Serialize;
 
@@ -24,7 +24,7 @@ struct LaunchAnswer {
     schema_version: u32,
     folder: String,
     shards: u32,
-    /// Most shards that the study may have.
+    /// Largest number of shards of the study.
     blocks: u64,
     files: Vec<String>,
     steps: Vec<StepAnswer>,
@@ -37,7 +37,7 @@ struct StepAnswer {
     line: String,
 }
 
-/// Writes the scripts and prints what to type; starts nothing.
+/// Writes the scripts and prints the commands; starts nothing.
 pub(super) fn launch(
     arguments: &StudyArguments,
     prepared: &PreparedStudy,
@@ -49,23 +49,23 @@ pub(super) fn launch(
         let finding = Finding::new(
             &prepared.study.source.file,
             format!(
-                "{} shards are too many: the study has {blocks} blocks of {} cases",
+                "{} shards, at most {blocks} possible: the study has {blocks} blocks of {} cases",
                 request.shards, manifest.block_cases
             ),
         )
         .key("--launch")
         .hint(format!(
-            "{}:{blocks} at most; a shard has at least one block",
+            "use {}:{blocks} or less; a shard requires at least one block",
             request.launcher.name()
         ));
         return Err(finding.into());
     }
-    let here = std::env::current_dir().context("cannot tell the current folder")?;
+    let here = std::env::current_dir().context("cannot determine the current folder")?;
     // Inside another program the command line is what is on the path.
     let program = if host::is_hosted() {
         PathBuf::from("needlebench")
     } else {
-        std::env::current_exe().context("cannot tell where this program is")?
+        std::env::current_exe().context("cannot determine the path of this program")?
     };
     let cache = std::env::var_os("NEEDLEBENCH_CACHE_DIR").map(PathBuf::from);
     let cache = cache.filter(|cache| !cache.as_os_str().is_empty());
@@ -156,24 +156,24 @@ fn write(path: &Path, file: &LaunchFile) -> std::io::Result<()> {
     Ok(())
 }
 
-/// What is worth changing, once a few cases have been computed.
+/// Advice on the number of shards, from the time of a few cases.
 fn advised(prepared: &PreparedStudy, request: LaunchRequest, cases: u64, jobs: u16) -> Vec<String> {
     let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design, &prepared.columns);
     let mut lines = match time_per_case(&evaluator, cases) {
         Ok(each) => advice(request, cases, jobs, each),
-        Err(message) => vec![format!("how long a shard takes is not known: {message}")],
+        Err(message) => vec![format!("time per shard unknown: {message}")],
     };
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let processes = u64::from(request.shards) * u64::from(jobs);
     if request.launcher == Launcher::Local && processes > cores as u64 {
         lines.push(format!(
-            "all shards run at the same time, and this machine has {cores} cores"
+            "all shards run simultaneously, and this machine has {cores} cores"
         ));
     }
     lines
 }
 
-/// Another robot, as options.
+/// The robot arguments, as options.
 fn options(robot: &RobotArguments) -> Vec<String> {
     let path = |path: &PathBuf| path.display().to_string();
     let urdf = &robot.urdf;

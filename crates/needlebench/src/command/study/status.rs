@@ -1,10 +1,10 @@
-//! `needlebench study --status`: how far the shards of a study are.
+//! `needlebench study --status`: progress of the shards of a study.
 
 use std::collections::BTreeMap;
 
 use anyhow::Result;
 use needlebench_bench::study::{PreparedStudy, SHARDS_VARIABLE, shards_of};
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 use needlebench_study::{Shard, ShardState, Survey, ranges, survey};
 use serde::Serialize;
 
@@ -20,20 +20,20 @@ struct StatusAnswer<'a> {
     schema_version: u32,
     name: &'a str,
     study_id: &'a str,
-    /// Whether all cases are there.
+    /// Whether all cases are complete.
     complete: bool,
     cases: u64,
-    /// Cases that are in some shard.
+    /// Cases that some shard contains.
     done: u64,
-    /// Most shards that the study may have.
+    /// Largest number of shards of the study.
     blocks: u64,
-    /// Number of parts of which `missing` and `running` are; null where nobody says it.
+    /// Number of parts that `missing` and `running` refer to; null if unknown.
     shards: Option<u32>,
-    /// Other numbers of parts, and how many folders are of each.
+    /// Other numbers of parts, with the number of folders of each.
     mixed: &'a BTreeMap<u32, usize>,
-    /// Parts to start, or to start again.
+    /// Parts to start or restart.
     missing: &'a [u32],
-    /// Parts that somebody computes.
+    /// Parts that are being computed.
     running: &'a [u32],
     folders: Vec<FolderAnswer>,
 }
@@ -41,7 +41,7 @@ struct StatusAnswer<'a> {
 #[derive(Serialize)]
 struct FolderAnswer {
     folder: String,
-    /// K/N; null where it is of the whole study.
+    /// K/N; null for the whole study.
     shard: Option<String>,
     state: &'static str,
     done: u64,
@@ -56,7 +56,7 @@ fn word(state: ShardState) -> &'static str {
     }
 }
 
-/// Prints how far the shards are: 0 if all cases are there.
+/// Prints the progress of the shards; exit status 0 if all cases are complete.
 pub(super) fn status(
     arguments: &StudyArguments,
     prepared: &PreparedStudy,
@@ -79,7 +79,7 @@ pub(super) fn status(
         }
         if !found.running.is_empty() {
             complain(&format!(
-                "left out, since they are running: {}",
+                "not listed, because they are running: {}",
                 ranges(found.running.iter().copied())
             ));
         }
@@ -121,18 +121,18 @@ pub(super) fn status(
 fn nobody_says(arguments: &StudyArguments) -> Finding {
     Finding::new(
         shown(&arguments.status[0]),
-        "no shard is there yet, so nobody says of how many",
+        "no shard exists yet, so the number of shards is unknown",
     )
     .key("--missing")
     .hint(format!("set {SHARDS_VARIABLE} to the number of shards"))
 }
 
-/// What is odd about the folders.
+/// Irregularities of the folders.
 fn remarks(found: &Survey) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(first) = found.others.first() {
         lines.push(format!(
-            "left out, since they are of other studies: {} folders, such as {}",
+            "ignored, because they belong to other studies: {} folders, e.g. {}",
             found.others.len(),
             shown(first)
         ));
@@ -143,7 +143,7 @@ fn remarks(found: &Survey) -> Vec<String> {
             .map(|(parts, count)| format!("{count} of shards of {parts}"))
             .collect();
         lines.push(format!(
-            "shards are mixed: beside those of {parts} there are {}; their cases count, the numbers below are of {parts}",
+            "mixed shards: besides those of {parts} there are {}; their cases count, the numbers below refer to {parts}",
             mixed.join(", ")
         ));
     }
@@ -155,7 +155,7 @@ fn text(name: &str, found: &Survey) -> String {
         .parts
         .map_or(String::new(), |parts| format!(", in shards of {parts}"));
     let mut lines = vec![format!(
-        "{name}: {} of {} cases are there{of}",
+        "{name}: {} of {} cases complete{of}",
         found.done, found.cases
     )];
     for state in [ShardState::Done, ShardState::Running, ShardState::Stopped] {
@@ -178,7 +178,7 @@ fn text(name: &str, found: &Survey) -> String {
     lines.push(line("missing", begun.len(), &ranges(begun)));
     if !found.missing.is_empty() {
         lines.push(format!(
-            "to start, or start again: {}",
+            "to start or restart: {}",
             ranges(found.missing.iter().copied())
         ));
     }
