@@ -24,10 +24,10 @@ fn a_run_leaves_the_table_in_three_formats_and_takes_it_away_again() {
     let answer = bench.run(format!("{run} {table}")).exits_with(0);
     for part in [
         "before insertion (robot and registration)",
-        "nothing of a real arm's accuracy",
-        "Published, not before insertion",
+        "not the accuracy of a real arm",
+        "Published errors",
         "doi 10.1002/rcs.1440",
-        "in accuracy.md with their DOIs",
+        "with DOIs in accuracy.md",
     ] {
         let words: Vec<&str> = answer.stdout.split_whitespace().collect();
         assert!(

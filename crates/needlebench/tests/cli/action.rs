@@ -87,7 +87,7 @@ fn scenarios_are_run_summarised_and_compared_with_a_baseline() {
     };
     let same = with_baseline("small.toml\nother.toml");
     assert_eq!(same.status, 0, "{}", same.printed);
-    assert_eq!(same.printed.matches("PASS: nothing was lost").count(), 2);
+    assert_eq!(same.printed.matches("PASS: no regression").count(), 2);
     assert!(bench.path("now/small/compare.xml").exists());
     let moved = with_edit(SMALL, "top_height_mm = 763.5", "top_height_mm = 768.5");
     bench.write("small.toml", moved);
@@ -161,9 +161,9 @@ fn the_release_of_the_actions_own_version_is_installed_if_it_is_what_was_release
         fs::remove_dir_all(path.trim()).unwrap();
     }
     for (version, reference, reason) in [
-        ("", "main", "give `version`"),
+        ("", "main", "set the input `version`"),
         ("1.0.0", "main", "cannot fetch"),
-        ("1;true", "main", "is no version"),
+        ("1;true", "main", "is not a valid version"),
     ] {
         let step = install(&[("INPUT_VERSION", version), ("ACTION_REF", reference)]);
         assert_ne!(step.status, 0);

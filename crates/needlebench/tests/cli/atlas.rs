@@ -8,7 +8,7 @@ use crate::support::{Bench, Json, SMALL, has_keys, with_edit};
 
 fn answer(jobs: &str) -> (Bench, Value) {
     let bench = Bench::with_scenario(SMALL);
-    let arguments = format!("atlas s.toml --rolls 24 --json --jobs {jobs}");
+    let arguments = format!("roll-map s.toml --rolls 24 --json --jobs {jobs}");
     let answer = bench.run(&arguments).exits_with(0).json();
     (bench, answer)
 }
@@ -88,12 +88,12 @@ fn files_are_the_same_for_every_number_of_threads() {
 fn table_names_ranges_and_the_roll_that_the_goal_fixes() {
     let bench = Bench::with_scenario(SMALL);
     let answer = bench
-        .run("atlas s.toml --rolls 24 --no-pictures")
+        .run("roll-map s.toml --rolls 24 --no-pictures")
         .exits_with(0);
     answer.says([
         "Right-Down-Fold",
-        "the goal fixes 0.0 deg",
-        "the best roll is best for",
+        "the goal fixes the roll at 0.0 deg",
+        "best roll by",
         "results: out/small",
     ]);
     let expected = ["small/atlas.html", "small/atlas.json"].map(Path::new);
@@ -115,8 +115,8 @@ fn nothing_that_works_is_a_failed_criterion() {
     let far = with_edit(&far, "center_mm = [300, -598]", "center_mm = [300, -1198]");
     let bench = Bench::with_scenario(&far);
     let answer = bench
-        .run("atlas s.toml --rolls 12 --no-pictures")
+        .run("roll-map s.toml --rolls 12 --no-pictures")
         .exits_with(1);
-    answer.says(["nowhere"]);
+    answer.says(["infeasible at any roll"]);
     answer.says(["out of reach"]);
 }

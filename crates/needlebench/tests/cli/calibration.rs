@@ -7,7 +7,7 @@ use crate::support::{
 };
 
 /// A real UR3.
-const UR3: &str = include_str!("../../../cell/tests/cell/calibration/ur3_half_turns.yaml");
+const UR3: &str = include_str!("../../../scenario/tests/scenario/calibration/ur3_half_turns.yaml");
 
 /// What the inverse kinematics promises, m and rad.
 const RESIDUAL: f64 = 1e-12;

@@ -147,9 +147,9 @@ fn reach_route_start_and_target_are_known_without_a_simulation() {
     let text = bench.run("check s.toml").exits_with(0).stdout;
     holds(
         &text,
-        ["8 configurations can work (postures only, motions not planned)"],
+        ["8 configurations feasible (postures only, motions not planned)"],
     );
-    assert!(text.contains("needle route: "), "{text}");
+    assert!(text.contains("needle path: "), "{text}");
 }
 
 #[test]
@@ -169,7 +169,10 @@ fn a_goal_out_of_reach_is_a_finding_with_what_is_missing() {
         .position(|line| line.starts_with("entry_mm"))
         .unwrap();
     let message = findings[0]["message"].word();
-    holds(message, ["out of reach", "mm or more are missing"]);
+    holds(
+        message,
+        ["out of reach", "mm or more in every configuration"],
+    );
     assert_eq!(findings[0]["key"], "goals[0].entry_mm");
     assert_eq!(findings[0]["line"], line);
     // A run says the same, configuration by configuration.

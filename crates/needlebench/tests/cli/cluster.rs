@@ -59,7 +59,7 @@ fn shards_of_any_scheduler_are_told_apart_counted_and_merged_from_their_folder()
     let bench = Bench::with_study(STUDY);
     status(&bench, "--missing")
         .exits_with(2)
-        .complains(["nobody says of how many", "NEEDLEBENCH_SHARDS"]);
+        .complains(["the number of shards is unknown", "NEEDLEBENCH_SHARDS"]);
     task(&bench, &[])
         .exits_with(2)
         .complains(["--shard auto", "SLURM_ARRAY_TASK_ID"]);
@@ -80,12 +80,12 @@ fn shards_of_any_scheduler_are_told_apart_counted_and_merged_from_their_folder()
     let answer = status(&bench, "").exits_with(1);
     assert_eq!(
         answer.stdout,
-        "moved: 48 of 96 cases are there, in shards of 4\n\
+        "moved: 48 of 96 cases complete, in shards of 4\n\
          done         2  1,2\n\
          running      0\n\
          stopped      0\n\
          missing      2  3,4\n\
-         to start, or start again: 3,4\n"
+         to start or restart: 3,4\n"
     );
     assert_eq!(status(&bench, "--missing").exits_with(1).stdout, "3,4\n");
     let merge = "merge study.toml shards --no-page --quiet";
@@ -163,7 +163,7 @@ fn a_folder_in_use_may_pass_and_a_wrong_one_never_does() {
     bench
         .run(arguments)
         .exits_with(2)
-        .complains(["is of shard 2/4"]);
+        .complains(["holds shard 2/4"]);
 }
 
 /// Runs a line of a shell in the bench's folder.
@@ -218,7 +218,7 @@ fn a_launch_is_refused_where_it_cannot_go_well_and_writes_the_same_bytes_elsewhe
     let answer = launch("slurm:8").exits_with(0);
     answer.says([
         "start:\n  sbatch out/moved/launch/job.sh\n",
-        "start what is missing:\n  sh out/moved/launch/missing.sh\n",
+        "start missing shards:\n  sh out/moved/launch/missing.sh\n",
         "merge:\n  sh out/moved/launch/merge.sh\n",
         "  needlebench study study.toml --status out/moved/shards\n",
     ]);

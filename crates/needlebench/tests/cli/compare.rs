@@ -126,7 +126,7 @@ fn reports_that_cannot_be_used_are_refused_with_file_and_line() {
     bench
         .run("compare a.json half.json")
         .exits_with(2)
-        .complains(["half.json:40", "ends too early", "line 40 column"]);
+        .complains(["half.json:40", "is truncated", "line 40 column"]);
 }
 
 #[test]

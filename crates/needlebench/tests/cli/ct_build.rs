@@ -95,7 +95,7 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
         &words,
         [
             "FRE",
-            "does not tell the error at the target",
+            "does not predict the TRE",
             "TRE",
             "needlebench check",
         ],

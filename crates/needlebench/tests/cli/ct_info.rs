@@ -113,7 +113,7 @@ fn people_read_it_within_eighty_columns() {
             "16 x 12 x 4 voxels",
             "0.5000 x 0.7500 x 2.5000 mm",
             "5.000 mm: slices overlap by 2.500 mm",
-            "LPS (columns, rows, slices run to left, back, head)",
+            "LPS (columns, rows, slices increase towards left, back, head)",
             "-1000 to 40",
             "peak at -1000 HU",
         ],
@@ -189,7 +189,7 @@ fn what_cannot_be_read_names_the_file() {
     let folder = series(&bench, "cut", &[0.0, 2.5, 5.0], 4);
     write_slice(&bench.path("cut").join("4-49"), 2.5, 4, 10);
     let refused = bench.run(format!("ct info {folder}")).exits_with(2).stderr;
-    holds(&refused, ["4-49", "cut off"]);
+    holds(&refused, ["4-49", "truncated"]);
     let missing = bench.run("ct info no_such_scan.nii").exits_with(2).stderr;
     assert!(missing.contains("no_such_scan.nii"), "{missing}");
     let small = series(&bench, "small", &[0.0, 2.5, 5.0], 4);

@@ -110,7 +110,7 @@ fn what_cannot_be_planned_is_said() {
     fails("patient --lesion no_such", "no_such");
     fails("nowhere", "nowhere");
     fails("ct", "ct build");
-    fails("patient --write elsewhere.toml", "beside the scenario");
+    fails("patient --write elsewhere.toml", "scenario's folder");
     // Without markers nobody knows where the robot is: routes by the patient alone, and why.
     let build = "ct build ct/ct.nii.gz --out unregistered --lesion nodule=-107,10,35 --thickness-mm 2.5 \
                  --room s.toml --no-pictures";
@@ -145,7 +145,10 @@ fn a_goal_with_a_route_has_its_entry_planned() {
     let checked = bench.run("check s.toml").exits_with(0);
     let words: Vec<&str> = checked.stdout.split_whitespace().collect();
     let said = format!("{} {}", words.join(" "), checked.stderr);
-    holds(&said, ["route planned for goal `right_pleural_lateral`"]);
+    holds(
+        &said,
+        ["needle path planned for goal `right_pleural_lateral`"],
+    );
     // Not both.
     let both = planned.replace(
         "[goals.route]",
@@ -155,12 +158,81 @@ fn a_goal_with_a_route_has_its_entry_planned() {
         .run("check s.toml")
         .exits_with(2)
         .stderr;
-    holds(&text, ["has an entry and a route to be planned"]);
+    holds(&text, ["has both an entry and a needle path to plan"]);
     // Rules that nothing keeps.
     let hard = planned.replace("sigmas = 1", "margin_mm = 40");
-    let text = Bench::with_scenario(&hard)
-        .run("check s.toml")
-        .exits_with(2)
-        .stderr;
-    assert!(text.contains("has no route"), "{text}");
+    // They are no fault of the file: what it asks for is not met.
+    let bench = Bench::with_scenario(&hard);
+    for command in [
+        "check s.toml",
+        "check s.toml --json",
+        "run s.toml --out out",
+    ] {
+        let ran = bench.run(command).exits_with(1);
+        let text = format!("{}{}", ran.stdout, ran.stderr);
+        assert!(text.contains("has no needle path"), "{command}: {text}");
+    }
+}
+
+#[test]
+fn routes_recommend_what_a_run_of_the_plan_does() {
+    let text = fs::read_to_string(workspace().join("scenarios/supine_suite.toml")).unwrap();
+    let bench = Bench::with_scenario(&text);
+    for lesion in ["pleural_based", "right_upper_lobe"] {
+        let arguments = format!(
+            "ct routes s.toml --lesion {lesion} --directions 1500 --write {lesion}.toml --json"
+        );
+        let found = bench.run(&arguments).exits_with(0).json();
+        let target = &found["targets"][0];
+        let chosen = &target["chosen"];
+        let recommended = chosen["configuration"].word();
+        let route = &target["routes"][usize::try_from(chosen["route"].as_u64().unwrap()).unwrap()];
+        let served = route["configurations"].list();
+        let served = |label: &str| {
+            let mut all = served.iter();
+            let found = all.find(|each| each["label"].word() == label).unwrap();
+            found["works"].as_bool().unwrap()
+        };
+        // Exit 1: what the file expects of configurations is expected of its own entries.
+        let run = format!("run {lesion}.toml --engine rapier --no-pictures --out out --quiet");
+        bench.run(&run);
+        let report = bench.read_json(&format!("out/{lesion}/report.json"));
+        let goals = report["goals"].list();
+        let goal = goals
+            .iter()
+            .find(|goal| goal["name"] == target["goal"])
+            .unwrap();
+        let order = goal["ranking"]["order"].list();
+        let first = order.iter().map(Json::word).find(|label| served(label));
+        assert_eq!(Some(recommended), first, "{lesion}");
+        if order[0].word() == recommended {
+            assert_eq!(
+                chosen["because"], goal["recommended"]["summary"],
+                "{lesion}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_route_that_no_motion_serves_is_told_and_ends_with_1() {
+    let text = fs::read_to_string(workspace().join("scenarios/supine_suite.toml")).unwrap();
+    let hard = text.replace(
+        "max_peak_torque_ratio = 0.8",
+        "max_peak_torque_ratio = 0.05",
+    );
+    assert_ne!(hard, text);
+    let bench = Bench::with_scenario(&hard);
+    let arguments =
+        "ct routes s.toml --lesion pleural_based --directions 1500 --write p.toml --json";
+    let found = bench.run(arguments).exits_with(1).json();
+    assert_eq!(found["ok"], false);
+    let chosen = &found["targets"][0]["chosen"];
+    assert_eq!(chosen["configuration"], serde_json::Value::Null);
+    holds(
+        chosen["because"].word(),
+        ["no configuration is feasible with its motion"],
+    );
+    // The route is there to be looked into.
+    assert!(bench.path("p.toml").exists());
 }

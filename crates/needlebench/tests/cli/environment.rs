@@ -83,8 +83,9 @@ fn what_an_engine_did_not_measure_is_incomplete_wherever_a_verdict_stands() {
         first(&whole.stdout),
         format!("PASS small: {total} of {total} criteria met")
     );
-    let begin =
-        format!("INCOMPLETE small: {judged} of {total} criteria judged, all met; not judged: ");
+    let begin = format!(
+        "INCOMPLETE small: {judged} of {total} criteria evaluated, all met; not evaluated: "
+    );
     assert!(first(&partial.stdout).starts_with(&begin), "{partial:#?}");
     let markdown = bench.text("part/small/summary.md");
     assert!(
@@ -93,7 +94,7 @@ fn what_an_engine_did_not_measure_is_incomplete_wherever_a_verdict_stands() {
     );
     let junit = bench.text("part.xml");
     assert!(junit.contains("errors=\"8\""), "{junit}"); // six configurations, the goal, the engine
-    assert!(junit.contains("not judged: "), "{junit}");
+    assert!(junit.contains("not evaluated: "), "{junit}");
 
     // Compared with a whole run metrics are lost, which needs to be allowed by name.
     let compared = bench.run("compare whole/small part/small").exits_with(1);

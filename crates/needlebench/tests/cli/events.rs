@@ -109,7 +109,7 @@ fn contact_that_cannot_be_had_says_why() {
     for events in events(report()) {
         let press = &events["press"][1];
         let reason = press["not_staged"].word();
-        assert!(reason.contains("would touch as well"), "{reason}");
+        assert!(reason.contains("would also touch"), "{reason}");
         assert_eq!(press["force_difference"], Value::Null);
     }
 }

@@ -10,13 +10,13 @@ const COMMANDS: [&str; 23] = [
     "ik",
     "fk",
     "clearance",
-    "atlas",
+    "roll-map",
     "export",
     "compare",
     "ct",
     "view",
     "iso9283",
-    "record-plan",
+    "plan-excitation",
     "replay",
     "pairs",
     "paper",
@@ -48,8 +48,20 @@ fn help_of_the_program_lists_every_command_and_exit_status() {
     let help = words.join(" ");
     holds(
         &help,
-        ["0 all", "1 a criterion", "2 bad input", "3 the", "130"],
+        [
+            "0 all",
+            "1 a criterion",
+            "2 invalid input",
+            "3 environment",
+            "130",
+        ],
     );
+}
+
+#[test]
+fn former_names_are_accepted_with_a_note() {
+    let answer = Bench::new().run("atlas nosuch.toml").exits_with(2);
+    answer.complains(["note: atlas is now roll-map", "nosuch.toml"]);
 }
 
 #[test]

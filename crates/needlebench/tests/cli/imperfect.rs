@@ -48,7 +48,7 @@ fn engines_and_balance_of_torques_agree_on_where_an_imperfect_arm_ends() {
     let text = with_edit(&imperfect(BLOCKS), "hold_s = 0.1", "hold_s = 0.6");
     let bench = Bench::with_scenario(&text);
     let answer = bench.run("run s.toml --out a --jobs 1 --wide");
-    answer.says(["error budget of the needle's tip"]);
+    answer.says(["error budget of the needle tip"]);
     let once = report(&bench, "a/small/report.json");
     assert!(once["truth"]["flange_offset_m"][0].number() != 0.0);
     let configurations = once["goals"][0]["configurations"].list();
@@ -90,8 +90,8 @@ fn engines_and_balance_of_torques_agree_on_an_arm_under_another_gravity() {
     let bench = Bench::with_scenario(&text);
     let answer = bench.run("run s.toml --out a --wide");
     answer.says([
-        "with the nominal arm under another gravity than its controller believes in",
-        "note: the controller believes in a gravity of 9.82 m/s^2, where it is 9.80665 m/s^2",
+        "simulation residuals of the arm without imperfections, whose controller assumes another gravity",
+        "note: the controller assumes a gravity of 9.82 m/s^2 instead of 9.80665 m/s^2",
     ]);
     let report = report(&bench, "a/small/report.json");
     let gravity = &report["gravity"];
@@ -192,12 +192,12 @@ fn the_needle_is_measured_against_the_true_lesion() {
     let wide = said("--wide");
     for (text, part) in [
         (&screen, "true lesion: tip "),
-        (&screen, "mm across the needle"),
-        (&screen, "marker localisation as measured"),
+        (&screen, "mm, lateral "),
+        (&screen, "measured marker localisation"),
         (&wide, "true lesion: tip "),
         (
             &wide,
-            "note: error budget by measured covariances: registration; as the scenario and its defaults assume: \
+            "note: error budget from measured covariances: registration; assumed by the scenario and its defaults: \
              hand_eye, imaging",
         ),
     ] {

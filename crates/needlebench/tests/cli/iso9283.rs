@@ -53,7 +53,7 @@ fn shipped_test_passes_in_both_engines() {
         // The tracker's noise alone: 30 draws of sigma 5 um give l' + 3 S of 13 to 22 um.
         let rp_m = found["rp_m"].number();
         assert!((1e-5..3e-5).contains(&rp_m), "{rp_m}");
-        assert!(found["remark"].word().contains("tracker's noise alone"));
+        assert!(found["remark"].word().contains("tracker noise only"));
     }
     for name in [
         "commanded.csv",
@@ -78,7 +78,7 @@ fn shipped_test_passes_in_both_engines() {
 fn a_robot_without_anything_random_has_no_spread_and_says_so() {
     let bench = Bench::with_scenario(SMALL);
     let answer = bench.run("run s.toml").exits_with(0);
-    answer.says(["RP = 0 because nothing random is switched on"]);
+    answer.says(["RP = 0 because no random effects are enabled"]);
     answer.says(["4 cycles instead of the standard's 30"]);
     let report = bench.read_json("out/small/report.json");
     let found = &report["iso9283"]["engines"]["rapier"];

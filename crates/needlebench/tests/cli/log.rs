@@ -16,7 +16,7 @@ fn a_log_tells_what_was_read_and_decided_and_changes_no_result() {
         "INFO run{scenario=\"small\"}: begins engines=[\"rapier\"]",
         "start{engine=\"rapier\"}: engine started",
         "plan{goal=",
-        "works configuration=",
+        "feasible configuration=",
         "DEBUG written file=told/small/report.json bytes=",
     ]);
     // Each line has the seconds since the start, not the time of day.

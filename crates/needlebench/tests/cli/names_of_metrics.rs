@@ -80,8 +80,8 @@ fn a_name_that_static_studies_lack_is_answered_by_their_own_and_said() {
         bench.run(format!("compare {study} {study} --max-loss {limit}"))
     };
     let answer = compare("clearance@5=1mm").exits_with(0).stdout;
-    let note = "note: threshold clearance@5: `clearance` was not measured: compared by \
-                `clearance_static` (";
+    let note = "note: threshold clearance@5: `clearance` was not measured; compared by \
+                `clearance_static` instead (";
     assert!(answer.contains(note), "{answer}");
     let answer = compare("clearance_static@5=1mm").exits_with(0).stdout;
     assert!(!answer.contains("note:"), "{answer}");

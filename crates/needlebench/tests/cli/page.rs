@@ -31,7 +31,7 @@ fn texts_of_a_scenario_stay_texts() {
     );
     let bench = Bench::with_scenario(&text);
     bench.run("run s.toml --engine rapier").exits_with(0);
-    bench.run("atlas s.toml --rolls 12 --no-pictures");
+    bench.run("roll-map s.toml --rolls 12 --no-pictures");
     for name in ["out/small/report.html", "out/small/atlas.html"] {
         let html = page(&bench, name);
         assert!(html.contains("&lt;/script&gt;&lt;img src=x"), "{name}");
@@ -48,7 +48,7 @@ fn without_a_page_an_earlier_one_does_not_stay() {
     let without = format!("{arguments} --no-page");
     bench.run(&without).exits_with(0);
     assert!(!bench.path("out/small/report.html").exists());
-    let atlas = "atlas s.toml --rolls 12 --no-pictures";
+    let atlas = "roll-map s.toml --rolls 12 --no-pictures";
     bench.run(atlas);
     assert!(bench.path("out/small/atlas.html").exists());
     bench.run(format!("{atlas} --no-page"));

@@ -172,7 +172,7 @@ fn double_precision_is_far_more_accurate_than_the_paper_and_single_is_as_accurat
     let closed_form = row("library: closed form");
     assert!(number(&closed_form["position_max_m"]) < 1e-12);
     assert!(number(&closed_form["orientation_max"]) < 1e-12);
-    let single = row("equations 9 to 38, mended, single precision");
+    let single = row("equations 9 to 38, corrected, single precision");
     let median = number(&single["orientation_median"]);
     assert!((1e-8..1e-6).contains(&median), "{median}");
 }

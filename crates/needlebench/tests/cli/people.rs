@@ -38,7 +38,7 @@ fn room_is_reported_for_every_posture_with_people_or_without() {
     }
 
     let (bench, answer) = small_run_wide();
-    answer.says(["room for people"]);
+    answer.says(["free space and line of sight"]);
     let report = bench.read_json("out/small/report.json");
     for room in rooms(&report) {
         // The default: a doctor in three statures, across the patient from the robot.
@@ -87,7 +87,7 @@ fn nobody_stands_inside_the_arm() {
     for place in [[350.0, -150.0], [250.0, -150.0]] {
         let bench = Bench::with_scenario(&doctor_at(place));
         let answer = bench.run("check s.toml").exits_with(2);
-        holds(&answer.stderr, ["the start posture collides", "doctor"]);
+        holds(&answer.stderr, ["the start posture collides", "physician"]);
     }
 }
 
@@ -132,7 +132,7 @@ fn arm_and_tool_keep_away_from_people_on_every_motion() {
     let rejected = report["goals"][0]["configurations"].list().iter();
     let mut reasons = rejected.flat_map(|each| each["rejections"].list());
     assert!(
-        reasons.any(|each| each["detail"].word().contains("doctor")),
+        reasons.any(|each| each["detail"].word().contains("physician")),
         "{report:#}"
     );
 }

@@ -77,7 +77,7 @@ impl Log {
 #[test]
 fn plan_keeps_what_is_asked_for_and_is_the_same_again() {
     let bench = Bench::new();
-    let arguments = "record-plan --arm ur3e --poses 12 --json";
+    let arguments = "plan-excitation --arm ur3e --poses 12 --json";
     let plan = bench.run(arguments).exits_with(0).json();
     assert!(plan["planned"]["minimum_certified_m"].number() >= 0.005);
     for motion in plan["motions"].list() {
@@ -122,7 +122,7 @@ fn plan_keeps_what_is_asked_for_and_is_the_same_again() {
 fn script_makes_the_motions_of_the_scenario() {
     let bench = Bench::with_scenario(SMALL);
     bench
-        .run("record-plan s.toml --poses 10 --payload-kg 0,0.5")
+        .run("plan-excitation s.toml --poses 10 --payload-kg 0,0.5")
         .exits_with(0);
     let script = text(&bench, "out/small/excitation.script");
     let scenario = text(&bench, "out/small/excitation.toml");

@@ -1,4 +1,4 @@
-//! `run --referee` and the envelope of the engines' differences.
+//! `run --reference` and the envelope of the engines' differences.
 
 use serde_json::Value;
 
@@ -22,7 +22,7 @@ fn referee_measures_both_engines_and_their_order() {
     mujoco_is_ready();
     let bench = Bench::with_scenario(SMALL);
     let answer = bench.run("run s.toml --referee --wide").exits_with(0);
-    answer.says(["each engine beside the referee"]);
+    answer.says(["engines compared with the reference integrator"]);
     let report = bench.read_json("out/small/report.json");
     let engines = report["provenance"]["engines"].list();
     assert!(engines.iter().any(|each| each["name"] == "referee"));
@@ -58,7 +58,7 @@ fn difference_beyond_the_envelope_fails_and_is_explained() {
     mujoco_is_ready();
     let bench = Bench::with_scenario(&with_envelope("peak_tip_um = 0.001"));
     let answer = bench.run("run s.toml").exits_with(1);
-    answer.says(["is nearer to the referee"]);
+    answer.says(["is closer to the reference integrator"]);
     let report = bench.read_json("out/small/report.json");
     let broken: Vec<&Value> = report["criteria"]
         .list()

@@ -102,7 +102,7 @@ fn limits_that_are_missed_or_cannot_be_judged_fail() {
     let open = quick(&bench, "untargeted.csv", "--max-tracking 1").exits_with(1);
     open.says([
         "INCOMPLETE",
-        "NOT JUDGED max_tracking_mm",
+        "NOT EVALUATED max_tracking_mm",
         "nothing to replay",
     ]);
     quick(&bench, "untargeted.csv", "").exits_with(0);
@@ -123,7 +123,7 @@ fn what_is_wrong_with_a_log_is_said_with_its_place() {
     let anonymous = text.replacen("TCP_pose", "TCP_place", 1000);
     bench.write("anonymous.csv", &anonymous);
     let refused = quick(&bench, "anonymous.csv", "").exits_with(2);
-    refused.complains(["does not say which arm"]);
+    refused.complains(["does not identify its arm"]);
     quick(&bench, "anonymous.csv", "--arm ur3e").exits_with(0);
 }
 
@@ -159,7 +159,7 @@ fn a_recorded_run_of_ours_gives_back_what_was_put_in() {
     /// Estimates are within this many of their own intervals: of thirty of 95 % one or two are outside one.
     const INTERVALS: f64 = 2.5;
     let bench = Bench::new();
-    let plan = "record-plan --arm ur3e --poses 12 --payload-kg 0.8 --out out";
+    let plan = "plan-excitation --arm ur3e --poses 12 --payload-kg 0.8 --out out";
     bench.run(plan).exits_with(0);
     let mut scenario = bench.text("out/ur3e/excitation.toml");
     scenario += "\n[imperfections.calibration]\narm = \"population\"\n[imperfections.friction]\n\

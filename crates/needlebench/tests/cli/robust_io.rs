@@ -12,7 +12,7 @@ const FAILING: [&str; 10] = [
     "study nosuch.toml",
     "merge nosuch.toml shard",
     "compare nosuch nosuch",
-    "atlas nosuch.toml",
+    "roll-map nosuch.toml",
     "iso9283 --csv nosuch --commanded nosuch",
     "pairs nosuch.toml",
     "servo nosuch.toml",
@@ -112,7 +112,7 @@ fn a_file_beyond_all_measure_is_refused_by_its_size() {
         .unwrap()
         .set_len(1 << 34)
         .unwrap();
-    refused_everywhere(&bench, "huge", "MiB, the most that is read of such a file");
+    refused_everywhere(&bench, "huge", "MiB, the limit for such a file");
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn the_manifest_of_a_study_that_is_no_text_is_bad_input() {
     std::fs::create_dir_all(bench.path("out/one")).unwrap();
     bench.write("out/one/study.json", b"\xff\xfe{}");
     let answer = bench.run("study study.toml --resume").exits_with(2);
-    answer.complains(["study.json", "no UTF-8 text"]);
+    answer.complains(["study.json", "not UTF-8 text"]);
 }
 
 #[cfg(unix)]

@@ -88,7 +88,7 @@ fn the_answer_has_figures_of_layouts_that_nothing_was_compared_by() {
     let resumed = Bench::with_study(STUDY);
     resumed.copy(bench, "out");
     let text = run(&resumed, "--resume").exits_with(0).stdout;
-    holds(&text, ["best", "works"]);
+    holds(&text, ["best", "success"]);
     assert!(
         text.lines().all(|line| line.chars().count() <= 100),
         "{text}"

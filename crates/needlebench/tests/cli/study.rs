@@ -85,16 +85,16 @@ fn a_study_of_postures_says_so_everywhere_and_what_they_overstate() {
     let warned = answer
         .stdout
         .lines()
-        .position(|line| line.starts_with("POSTURES only: "));
+        .position(|line| line.starts_with("Postures only, "));
     assert!(warned.is_some_and(|line| line < 8), "{}", answer.stdout);
     let markdown = bench.text("out/moved/summary.md");
     assert!(markdown.starts_with("# moved (postures only): pass\n\n"));
-    assert!(markdown.find("- POSTURES only: ") < markdown.find("| choice"));
+    assert!(markdown.find("- Postures only, ") < markdown.find("| candidate"));
     let summary: Value = serde_json::from_slice(&bench.read("out/moved/summary.json")).unwrap();
     assert_eq!(summary["postures_only"], "all");
     let headline = summary["headline"].word();
     assert!(
-        headline.starts_with("postures only: ") && headline.contains("Of 4 cases"),
+        headline.starts_with("Postures only, ") && headline.contains("Of 4 cases"),
         "{headline}"
     );
     // Of the best choice alone, which has a third of the cases.
@@ -120,7 +120,7 @@ fn a_study_of_postures_says_so_everywhere_and_what_they_overstate() {
     let junit = bench.text("junit.xml");
     holds(
         &junit,
-        ["postures only: ", "name=\"choice\"", "best of 3 choices"],
+        ["Postures only, ", "name=\"choice\"", "best of 3 candidates"],
     );
     let page = bench.text("out/moved/report.html");
     assert!(page.contains("summary.headline"));
@@ -144,7 +144,7 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
         "moved, 96 cases (postures only): PASS: 1 of 1 criteria met"
     );
     assert!(
-        lines[1].starts_with("ANSWER: best height of 3: "),
+        lines[1].starts_with("ANSWER: best of 3 candidates: height = "),
         "{}",
         lines[1]
     );
@@ -156,9 +156,9 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
     let summary: Value = serde_json::from_slice(&bench.read("out/moved/summary.json")).unwrap();
     let sentence = summary["answer"]["sentence"].word();
     let label = summary["choices"]["choices"][0]["label"].word();
-    // Half of the cases cannot exist: the pose is the flange's, and a turned tool misses the patient.
-    answer.says(["16 of 32 cases are layouts that cannot exist"]);
-    for words in [label, "95 % interval", " % of 16 layouts"] {
+    // Half of the cases are invalid layouts: the pose is the flange's, and a turned tool misses the patient.
+    answer.says(["16 of 32 cases are invalid layouts"]);
+    for words in [label, "95 % CI", " % of 16 layouts"] {
         assert!(sentence.contains(words), "{sentence}");
     }
     let markdown = bench.text("out/moved/summary.md");
@@ -167,19 +167,15 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
             .find(words)
             .unwrap_or_else(|| panic!("{words} in {markdown}"))
     };
-    assert!(at(sentence) < at("| choice"));
-    assert!(at("| choice") < at("| configuration"));
+    assert!(at(sentence) < at("| candidate"));
+    assert!(at("| candidate") < at("| configuration"));
     assert!(at("SRS-1") < at("<details>"));
     // A choice of what is drawn exactly has no tip error to show.
     assert!(!answer.stdout.contains("tip error"), "{}", answer.stdout);
     let all = run(&bench, "--no-page --resume --wide")
         .exits_with(0)
         .stdout;
-    for words in [
-        "all choices",
-        "which factor decides",
-        "criteria, word for word",
-    ] {
+    for words in ["all candidates", "main effects", "criteria in full"] {
         assert!(
             all.contains(words) && !answer.stdout.contains(words),
             "{words}"
@@ -206,7 +202,10 @@ fn named_levels_are_held_against_each_other_where_nothing_is_to_be_chosen() {
     assert_eq!(compared[0]["differs"], true);
     assert_eq!(compared[0]["levels"][1]["value"], 0.0);
     let sentence = summary["answer"]["sentence"].word();
-    holds(sentence, ["layouts that work by tool: ", "0.0 % (0.0 to"]);
+    holds(
+        sentence,
+        ["feasible layouts by tool: ", "0.0 % (95 % CI 0.0 to"],
+    );
 }
 
 #[test]
@@ -330,7 +329,7 @@ fn a_folder_with_results_is_neither_overwritten_nor_mixed() {
         .exits_with(2)
         .complains(["results.parquet", "--resume"]);
     let answer = run(&bench, "--resume").exits_with(0);
-    answer.complains(["results.parquet: is cut off", "computed again"]);
+    answer.complains(["results.parquet: is cut off", "recompute"]);
     assert!(bench.read("out/moved/results.parquet") == table);
 }
 

@@ -21,7 +21,7 @@ fn entries(answer: &Value) -> &Vec<Value> {
 #[test]
 fn proposed_entries_lie_on_the_skin_and_pass_check() {
     let bench = Bench::with_scenario(&suite());
-    let arguments = "suggest s.toml --goal right_upper_anterior --places 0 --json";
+    let arguments = "suggest s.toml --goal right_upper_anterior --placements 0 --json";
     let answer = bench.run(arguments).exits_with(0).json();
     assert_eq!(entries(&answer).len(), 3);
     for entry in entries(&answer) {
@@ -66,7 +66,7 @@ fn proposed_entries_lie_on_the_skin_and_pass_check() {
 #[test]
 fn proposed_places_pass_check_for_all_goals() {
     let bench = Bench::with_scenario(&suite());
-    let arguments = "suggest s.toml --entries 0 --places 2 --json";
+    let arguments = "suggest s.toml --entries 0 --placements 2 --json";
     let answer = bench.run(arguments).exits_with(0).json();
     let places = answer["places"]["places"].list();
     assert_eq!(places.len(), 2);
@@ -95,7 +95,7 @@ fn proposed_places_pass_check_for_all_goals() {
 fn answers_do_not_depend_on_threads() {
     let bench = Bench::with_scenario(SHORT);
     let ask = |jobs: &str| {
-        let arguments = format!("suggest s.toml --places 1 --json --jobs {jobs}");
+        let arguments = format!("suggest s.toml --placements 1 --json --jobs {jobs}");
         bench.run(&arguments).exits_with(0).stdout
     };
     assert_eq!(ask("1"), ask("3"));
@@ -105,7 +105,7 @@ fn answers_do_not_depend_on_threads() {
 fn a_scenario_is_written_that_passes_check_and_keeps_its_comments() {
     let bench = Bench::with_scenario(&suite());
     let arguments =
-        "suggest s.toml --lesion left_lower_lobe --places 1 --write new.toml --out maps";
+        "suggest s.toml --lesion left_lower_lobe --placements 1 --write new.toml --out maps";
     let said = bench.run(arguments).exits_with(0).stdout;
     assert!(said.contains("next: needlebench run new.toml"), "{said}");
     let text = bench.text("new.toml");
@@ -136,9 +136,12 @@ fn a_scenario_is_written_that_passes_check_and_keeps_its_comments() {
 fn where_there_is_no_entry_it_says_which_rule_refuses_most() {
     let short = suite().replace("needle_length_mm = 200", "needle_length_mm = 70");
     let bench = Bench::with_scenario(&short);
-    let arguments = "suggest s.toml --lesion left_lower_lobe --entries 1 --places 0";
+    let arguments = "suggest s.toml --lesion left_lower_lobe --entries 1 --placements 0";
     let said = bench.run(arguments).exits_with(1).stdout;
-    holds(&said, ["none: of", "most often: needle too short"]);
+    holds(
+        &said,
+        ["none: none of", "most frequent reason: needle too short"],
+    );
 }
 
 /// Half an hour in a debug build.
@@ -153,7 +156,7 @@ fn proposals_for_every_phantom_and_lesion_pass_check() {
             let [phantom, lesion] = [phantom, &lesion["name"]].map(super::support::Json::word);
             let text = format!("[phantom]\nmodel = \"{phantom}\"\n");
             bench.write("s.toml", &text);
-            let arguments = format!("suggest s.toml --lesion {lesion} --places 0 --json");
+            let arguments = format!("suggest s.toml --lesion {lesion} --placements 0 --json");
             let answer = bench.run(&arguments);
             let found = answer.json();
             assert_eq!(

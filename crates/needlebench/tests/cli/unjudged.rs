@@ -46,7 +46,7 @@ fn a_part_that_needs_no_shape_is_named_on_the_first_screen() {
     let answer = bench.run("run s.toml --engine rapier").exits_with(0);
     holds(
         &answer.stdout,
-        ["PASS small", "without a shape", "camera_link"],
+        ["PASS small", "without a collision shape", "camera_link"],
     );
     // A name that no link has is a slip.
     bench.write(
@@ -93,11 +93,25 @@ fn an_arm_stripped_of_its_shapes_is_judged_by_what_is_known_of_it() {
     for (own, known) in bare.1.iter().zip(&whole.1) {
         assert!((own - known).abs() < 1e-9, "{own} {known}");
     }
-    let screen = bench.run("run s.toml --engine rapier").exits_with(0);
-    holds(
-        &screen.stdout,
-        ["has no collision geometry", "stand for it"],
-    );
+    let screen = bench
+        .run("run s.toml --engine rapier --out said")
+        .exits_with(0);
+    let said = ["has no collision geometry", "are added to it"];
+    holds(&screen.stdout, said);
+    // Beside the verdict of every report, not at its end.
+    let mut folders = std::fs::read_dir(bench.path("said")).unwrap();
+    let folder = folders.find_map(|each| Some(each.ok()?.path()).filter(|path| path.is_dir()));
+    let folder = folder.unwrap();
+    let read = |file: &str| std::fs::read_to_string(folder.join(file)).unwrap();
+    holds(read("summary.md").split("\n## ").next().unwrap(), said);
+    assert_eq!(read("summary.md").matches(said[0]).count(), 7);
+    let junit = bench.run("run s.toml --engine rapier --out said --junit said/junit.xml");
+    junit.exits_with(0);
+    let junit = std::fs::read_to_string(bench.path("said/junit.xml")).unwrap();
+    let property = junit
+        .split("<property ")
+        .filter(|each| each.contains(said[0]));
+    assert_eq!(property.count(), 7);
 }
 
 #[test]
@@ -242,9 +256,9 @@ fn a_study_whose_engine_carries_out_no_motion_has_no_answer() {
         [
             "INCOMPLETE",
             "no answer",
-            "rapier could not carry out",
-            ", not judged",
+            "rapier could not execute",
+            ", not evaluated",
         ],
     );
-    assert!(!answer.stdout.contains("works in"), "{}", answer.stdout);
+    assert!(!answer.stdout.contains("feasible in"), "{}", answer.stdout);
 }

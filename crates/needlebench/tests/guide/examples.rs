@@ -50,10 +50,10 @@ fn resolved<'a>(schema: &'a Value, part: &'a Value) -> &'a Value {
 #[test]
 fn keys_of_examples_exist() {
     let schemas = [
-        needlebench_cell::scenario::scenario_schema(),
-        needlebench_cell::study::study_schema(),
-        needlebench_cell::arm::data::arm_schema(),
-        needlebench_cell::marker_list_schema(),
+        needlebench_scenario::scenario::scenario_schema(),
+        needlebench_scenario::study::study_schema(),
+        needlebench_robot::arm::data::arm_schema(),
+        needlebench_scenario::marker_list_schema(),
     ];
     let mut seen = 0;
     for chapter in chapters() {
