@@ -1,7 +1,7 @@
 //! What a page calls: functions of numbers, and one memory.
 //!
-//! The page asks for room, writes bytes or numbers there, calls, and reads numbers where `results` says,
-//! as many as the call says; or the bytes of a text where `message` says.
+//! The page requests memory, writes bytes or numbers there, calls a function, and reads as many numbers as it
+//! returned at `results`, or the bytes of a text at `message`.
 #![expect(
     unsafe_code,
     reason = "a function is exported under its own name by the attribute `no_mangle` alone, which counts as \
@@ -10,9 +10,9 @@
 
 use std::cell::RefCell;
 
-use needlebench_cell::pose_of;
 use needlebench_clearance::PairClearance;
 use needlebench_kinematics::Joints;
+use needlebench_scenario::pose_of;
 
 use crate::live::Live;
 use crate::scene::Scene;
@@ -63,7 +63,7 @@ fn numbers_of(pair: &PairClearance) -> [f64; 9] {
     [distance_m, a.x, a.y, a.z, b.x, b.y, b.z, first, second]
 }
 
-/// Room for so many bytes of input.
+/// Memory for so many bytes of input.
 #[unsafe(no_mangle)]
 extern "C" fn input(bytes: usize) -> *mut u8 {
     with(|state| {
@@ -85,7 +85,7 @@ extern "C" fn message() -> *const u8 {
     with(|state| state.message.as_ptr())
 }
 
-/// Prepares the scene that the input is; 1 if it is one.
+/// Prepares the scene of the input; 1 if it is valid.
 #[unsafe(no_mangle)]
 extern "C" fn load() -> u32 {
     with(|state| {
@@ -94,8 +94,8 @@ extern "C" fn load() -> u32 {
     })
 }
 
-/// Puts the base to a position (mm) and roll, pitch and yaw (deg): six numbers. The answer is the length
-/// of the message that says why its mount cannot carry it there, and 0 if it can.
+/// Moves the base to a position (mm) and roll, pitch and yaw (deg): six numbers. Returns the length of the
+/// message on why its mount cannot carry it there, and 0 if it can.
 #[unsafe(no_mangle)]
 extern "C" fn place_base() -> usize {
     with(|state| {
@@ -109,7 +109,7 @@ extern "C" fn place_base() -> usize {
     })
 }
 
-/// Puts the base back to where the scene has it.
+/// Moves the base back to its placement in the scene.
 #[unsafe(no_mangle)]
 extern "C" fn reset_base() {
     with(|state| state.live().reset_base());
@@ -134,8 +134,8 @@ extern "C" fn lowest() -> f64 {
     })
 }
 
-/// All eight configurations at a goal: outcome, roll, surplus, six joint positions (NaN without a
-/// posture), and pair and distance of what is nearest to its limit (NaN without).
+/// All eight configurations at a goal: outcome, roll, constraint margin, six joint positions (NaN without a
+/// posture), and pair and distance of the pair closest to its limit (NaN without).
 #[unsafe(no_mangle)]
 extern "C" fn reach(goal: usize, rolls: u32) -> usize {
     with(|state| {
@@ -159,7 +159,7 @@ extern "C" fn reach(goal: usize, rolls: u32) -> usize {
     })
 }
 
-/// What base and mount are in: body, other body and depth (m) of each.
+/// Overlaps of base and mount: body, other body and depth (m) of each.
 #[unsafe(no_mangle)]
 extern "C" fn overlaps() -> usize {
     with(|state| {

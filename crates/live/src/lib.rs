@@ -1,12 +1,12 @@
-//! What a page computes itself: clearances of a posture, and which configurations reach a goal, with the
-//! robot's base anywhere.
+//! Computations within a page: clearances of a posture, and feasible configurations at a goal, with any
+//! placement of the robot's base.
 //!
 //! The program writes a [`Scene`] into a page, as bytes that give the same bits back, and beside it this
-//! crate compiled to WebAssembly (`crates/live/build.mjs`). So the page's numbers come from the code that
-//! the program's come from: [`needlebench_clearance::ClearanceModel`] and
+//! crate compiled to WebAssembly (`crates/live/build.mjs`). The page's numbers come from the same code as
+//! the program's: [`needlebench_clearance::ClearanceModel`] and
 //! [`needlebench_kinematics::ik::Kinematics`].
 //!
-//! All of it is of one posture. Nothing is said of motions.
+//! All results are of single postures; motions are not evaluated.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 #[cfg(target_arch = "wasm32")]

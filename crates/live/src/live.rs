@@ -1,18 +1,19 @@
-//! A scene with its base somewhere.
+//! A scene with a movable base.
 
-use needlebench_cell::fixtures::{FixtureError, mount};
-use needlebench_cell::{BodyKind, BodyPair, ClearanceClass, CollisionBody, FOOT_M, Frame, RIGID_M};
+use needlebench_cell::{BodyKind, BodyPair, ClearanceClass, CollisionBody, Frame};
 use needlebench_clearance::{ClearanceModel, ClearanceParts, PairClearance};
 use needlebench_geometry::{Solid, TriangleMesh};
 use needlebench_kinematics::ik::Kinematics;
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
+use needlebench_scenario::fixtures::{FixtureError, mount};
+use needlebench_scenario::{FOOT_M, RIGID_M};
 
 use crate::scene::{Scene, Tie};
 
 /// Fineness of a mount's curved surfaces, which it has none of, m.
 const CHORD_ERROR_M: f64 = 1e-3;
 
-/// A scene whose base goes where it is put.
+/// A scene whose base can be moved.
 #[derive(Debug)]
 pub struct Live {
     pub(crate) scene: Scene,
@@ -21,21 +22,21 @@ pub struct Live {
     bodies: Vec<CollisionBody>,
     /// Pairs of the scene.
     pub(crate) model: ClearanceModel,
-    /// Base and mount against what stands in the room.
+    /// Base and mount against the fixed bodies of the room.
     standing: ClearanceModel,
     standing_pairs: Vec<BodyPair>,
     /// None for an arm that is not of UR's build.
     pub(crate) kinematics: Option<Kinematics>,
 }
 
-/// Base or mount in something that stands in the room.
+/// Overlap of base or mount with a fixed body of the room.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Overlap {
     /// Body of the base, or what goes along with it.
     pub body: usize,
-    /// What it is in.
+    /// The body that it overlaps.
     pub other: usize,
-    /// How deep, m.
+    /// Depth, m.
     pub depth_m: f64,
 }
 
@@ -64,10 +65,10 @@ impl Live {
         }
     }
 
-    /// Puts the base, and what goes along with it, to another place.
+    /// Moves the base, and what is attached to it, to another placement.
     ///
     /// # Errors
-    /// Where its mount cannot carry it there; all stays as it was.
+    /// A placement at which its mount cannot carry it; all stays as it was.
     pub fn place_base(&mut self, world_from_base_link: &Pose) -> Result<(), FixtureError> {
         let carried = match &self.scene.mount {
             Some(section) => {
@@ -104,7 +105,7 @@ impl Live {
         Ok(())
     }
 
-    /// Puts the base back to where the scene has it.
+    /// Moves the base back to its placement in the scene.
     pub fn reset_base(&mut self) {
         *self = Self::new(self.scene.clone());
     }
@@ -114,7 +115,7 @@ impl Live {
         self.model.all_pairs(q)
     }
 
-    /// What base and mount are in, deeper than a foot or rounding is.
+    /// Overlaps of base and mount, deeper than a foot or rounding is.
     pub fn overlaps(&self) -> Vec<Overlap> {
         let found = self.standing.all_pairs(&self.scene.start).into_iter();
         let overlaps = found.map(|it| Overlap {
@@ -131,7 +132,7 @@ impl Live {
             .collect()
     }
 
-    /// Lowest point of boxes around what moves, over the floor, m.
+    /// Lowest point of boxes around the moving bodies, over the floor, m.
     pub fn lowest_m(&self, q: &Joints) -> f64 {
         let links: [Pose; JOINT_COUNT] = self
             .scene
@@ -172,7 +173,7 @@ impl Live {
     }
 }
 
-/// Base and mount against all that stands in the room and does not go along.
+/// Base and mount against all bodies of the room that do not move with them.
 fn standing_pairs(scene: &Scene) -> Vec<BodyPair> {
     let places = 0..scene.bodies.len();
     let stands = |at: usize| scene.bodies[at].body.frame == Frame::World;
@@ -183,7 +184,7 @@ fn standing_pairs(scene: &Scene) -> Vec<BodyPair> {
         others.map(move |b| BodyPair {
             a,
             b,
-            // Any: nobody asks for these by class.
+            // Any: these are not used by class.
             class: ClearanceClass::RobotObstacle,
         })
     };

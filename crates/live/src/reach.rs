@@ -1,12 +1,13 @@
-//! Which of the eight configurations bring the guide to a goal, and with what clearance.
+//! Feasibility and clearance of the eight configurations at a goal.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{UnitQuaternion, Vector3};
-use needlebench_cell::{ClearanceClass, Roll};
+use needlebench_cell::ClearanceClass;
 use needlebench_clearance::PairClearance;
 use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, Solutions};
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
+use needlebench_scenario::Roll;
 
 use crate::live::Live;
 use crate::scene::CLASS_COUNT;
@@ -14,38 +15,38 @@ use crate::scene::CLASS_COUNT;
 /// Halvings of the step between rolls: 0.01 deg from 10 deg.
 const HALVINGS: u32 = 10;
 
-/// What becomes of a configuration, the worse the earlier.
+/// Outcome of a configuration, from worst to best.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
     /// It does not reach the goal.
     Unreachable,
-    /// It is the same posture as another configuration.
+    /// It coincides with another configuration.
     Merged,
-    /// A joint has no place in its range.
+    /// A joint is beyond its limits.
     JointLimit,
-    /// It is too near to a singularity.
+    /// It is too close to a singularity.
     Singular,
-    /// Something is nearer than the scenario's floor.
+    /// A clearance is below the scenario's floor.
     TooNear,
-    /// No rule is broken, but a criterion about clearances is missed.
+    /// No rule is violated, but a criterion on clearances fails.
     Misses,
-    /// Nothing is wrong with the posture.
+    /// The posture is feasible.
     Works,
 }
 
-/// A configuration at the best roll of those that were looked at.
+/// A configuration at the best of the rolls that were checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
-    /// What becomes of it.
+    /// Its outcome.
     pub outcome: Outcome,
     /// Angle of the guide about the needle, rad.
     pub roll_rad: f64,
     /// Joint positions within their ranges, rad, where it reaches the goal.
     pub joints: Option<Joints>,
-    /// What decides between rolls of the same outcome: distance beyond the limits, or how far a goal that is
-    /// not reached is missed (negative), m.
+    /// Order of rolls with the same outcome: constraint margin, or the shortfall to a goal out of reach
+    /// (negative), m.
     pub surplus_m: f64,
-    /// The pair that is nearest to its limit, where clearances were computed.
+    /// The pair closest to its limit, where clearances were computed.
     pub nearest: Option<PairClearance>,
 }
 
@@ -66,9 +67,9 @@ impl Reach {
 }
 
 impl Live {
-    /// All eight configurations at a goal, in the order of [`Configuration::ALL`]: each at the best roll that
-    /// is found, from the best of `rolls` rolls all round, or at the goal's one if it has one. Empty for an
-    /// arm that is not of UR's build.
+    /// All eight configurations at a goal, in the order of [`Configuration::ALL`]: each at the best roll
+    /// found, from the best of `rolls` rolls over the full circle, or at the goal's roll if it is fixed. Empty
+    /// for an arm without UR geometry.
     ///
     /// # Panics
     /// If there is no such goal.
@@ -103,8 +104,8 @@ impl Live {
         .collect()
     }
 
-    /// The best that is found beside a roll, between it and its neighbours: a range of rolls that works may lie
-    /// between two of the grid.
+    /// The best roll found between a roll and its neighbours: a feasible range may lie between two of the
+    /// grid.
     fn climbed(
         &self,
         goal: usize,
@@ -158,7 +159,7 @@ impl Live {
         self.judged(kinematics, joints, roll_rad)
     }
 
-    /// With the whole turns that bring every joint into its range, as few as can be.
+    /// The 2 pi equivalent with every joint within its limits and the fewest turns.
     fn within_limits(&self, solution: &Solution) -> Option<Joints> {
         let mut joints = solution.joints;
         for joint in 0..JOINT_COUNT {

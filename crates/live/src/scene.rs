@@ -1,16 +1,17 @@
-//! What clearances and configurations are computed from, as a value and as bytes.
+//! Input of clearances and configurations, as a value and as bytes.
 
-use needlebench_cell::scenario::{AttachedTo, MountSection, PlanningSection, TableSection};
-use needlebench_cell::{BodyKind, BodyPair, ClearanceClass, CollisionBody, ResolvedScenario, Roll};
+use needlebench_cell::{BodyKind, BodyPair, ClearanceClass, CollisionBody};
 use needlebench_geometry::Solid;
 use needlebench_geometry::encoding::{decode, encode};
 use needlebench_kinematics::{Chain, JointLimits, Joints, Pose};
+use needlebench_scenario::scenario::{AttachedTo, MountSection, PlanningSection, TableSection};
+use needlebench_scenario::{ResolvedScenario, Roll};
 use serde::{Deserialize, Serialize};
 
 /// Number of classes.
 pub(crate) const CLASS_COUNT: usize = ClearanceClass::ALL.len();
 
-/// What of a cell a page's arm meets. Names stay outside: bodies, solids and pairs go by their indices in
+/// The parts of a cell that clearances depend on. Names stay outside: bodies, solids and pairs go by their indices in
 /// the cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
@@ -28,37 +29,37 @@ pub struct Scene {
     pub bodies: Vec<SceneBody>,
     /// Pairs whose distance is measured.
     pub pairs: Vec<BodyPair>,
-    /// What carries the robot, made anew where the base goes.
+    /// What carries the robot, generated for each base placement.
     pub mount: Option<MountSection>,
     /// The table, to which a mount may be clamped.
     pub table: Option<TableSection>,
-    /// Where the guide is to be, by goal.
+    /// Required pose of the guide, by goal.
     pub goals: Vec<GoalPose>,
-    /// What postures have to keep.
+    /// Limits of postures.
     pub limits: Limits,
 }
 
-/// A body, and how it goes where the base goes.
+/// A body, and how it moves with the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneBody {
     /// The body.
     pub body: CollisionBody,
-    /// How it goes along.
+    /// How it moves.
     pub tie: Tie,
 }
 
-/// How a body goes where the robot's base goes.
+/// How a body moves with the robot's base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Tie {
-    /// It stands in the room, or moves with a link.
+    /// It is fixed in the room, or moves with a link.
     None,
     /// It is bolted to the base.
     Base,
-    /// It is made anew: `[mount]`.
+    /// It is generated for the base placement: `[mount]`.
     Mount,
 }
 
-/// Where the guide is to be.
+/// Required pose of the guide.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GoalPose {
     /// The guide's exit at roll 0.
@@ -67,13 +68,13 @@ pub struct GoalPose {
     pub roll: Roll,
 }
 
-/// What a posture has to keep not to be rejected, and not to fail. By class, m; negative infinity where
-/// nothing is asked.
+/// Limits below which a posture is rejected, and below which a criterion fails. By class, m; negative infinity
+/// for none.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
-    /// What is nearer is rejected.
+    /// Clearances below are rejected.
     pub floor_m: [f64; CLASS_COUNT],
-    /// What is nearer misses its criterion.
+    /// Clearances below fail the criterion.
     pub judged_m: [f64; CLASS_COUNT],
     /// Least `|sin q5|` and `|sin q3|`.
     pub singularity_sine: f64,

@@ -1,10 +1,11 @@
-//! Accuracy of both methods, beside the paper's figures and beside what limits them.
+//! Accuracy of both methods, compared with the values of the paper and the limits of rounding.
 
 use nalgebra::Matrix4;
 use needlebench_kinematics::ik::{GaussNewtonOptions, Numerical, closed_form};
 use needlebench_kinematics::pose_sets::PoseSet;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, UrGeometry, base_from_base_link};
+use needlebench_numerics::order::upper_median;
+use needlebench_numerics::random::SplitMix64;
 use serde::Serialize;
 
 use super::closed_form::{Mended, solve};
@@ -12,13 +13,13 @@ use super::dh::{Arm, Target, origin, rotation};
 use super::equations::SEED;
 use super::{Watch, printed};
 
-/// Where a figure comes from.
+/// Source of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
     Paper,
     ThisRun,
-    /// Rounding that no method can beat in its precision.
+    /// Rounding limit of any method in its precision.
     Limit,
     /// The machine.
     Robot,
@@ -29,7 +30,7 @@ pub enum Source {
 pub struct AccuracyRow {
     pub name: &'static str,
     pub source: Source,
-    /// Number of joint vectors; null for figures of others.
+    /// Number of joint vectors; null for values of others.
     pub samples: Option<usize>,
     /// Median and largest position error, m; null where not measured or not stated.
     pub position_median_m: Option<f64>,
@@ -37,12 +38,12 @@ pub struct AccuracyRow {
     /// Median and largest error of the rotation matrix's entries, 1.
     pub orientation_median: Option<f64>,
     pub orientation_max: Option<f64>,
-    /// Of a stated figure: position or orientation or both; the paper does not say.
+    /// A stated value: position or orientation or both; the paper does not specify.
     pub stated: Option<f64>,
     pub remark: &'static str,
 }
 
-/// Position errors, m, and orientation errors of poses that are to be equal.
+/// Position errors, m, and orientation errors of poses that should be equal.
 #[derive(Default)]
 struct Tally([Vec<f64>; 2]);
 
@@ -54,7 +55,7 @@ impl Tally {
 
     fn row(self, name: &'static str, source: Source, remark: &'static str) -> AccuracyRow {
         let samples = self.0[0].len();
-        let [position, orientation] = self.0.map(|mut errors| (median(&mut errors), errors));
+        let [position, orientation] = self.0.map(|mut errors| (upper_median(&mut errors), errors));
         AccuracyRow {
             samples: Some(samples),
             position_median_m: Some(position.0),
@@ -65,12 +66,6 @@ impl Tally {
             ..stated(name, source, f64::NAN, remark)
         }
     }
-}
-
-/// Middle value; not a number for none. Leaves them sorted.
-pub fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn stated(name: &'static str, source: Source, value: f64, remark: &'static str) -> AccuracyRow {
@@ -90,7 +85,7 @@ fn stated(name: &'static str, source: Source, value: f64, remark: &'static str) 
 /// Distance of the numerical method's guesses, rad: "good estimate of the initial condition".
 const GUESS_RAD: f64 = 0.05;
 
-/// Position repeatability of the UR3, m: the figure usually quoted.
+/// Position repeatability of the UR3, m: the value usually quoted.
 const REPEATABILITY_M: f64 = 1e-4;
 
 #[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
@@ -154,29 +149,29 @@ pub fn evaluate(count: usize, watch: &Watch<'_>) -> Vec<AccuracyRow> {
         ),
         library.row("library: closed form", Source::ThisRun, "all solutions"),
         mended.row(
-            "equations 9 to 38, mended",
+            "equations 9 to 38, corrected",
             Source::ThisRun,
-            "all solutions; the largest near singularities, which it does not treat",
+            "all solutions; the largest near singularities, which it does not handle",
         ),
         newton.row(
             "library: Gauss-Newton",
             Source::ThisRun,
-            "from within 0.05 rad, where it converges",
+            "guesses within 0.05 rad, where it converges",
         ),
         floor.row(
             "forward kinematics in double precision",
             Source::Limit,
-            "the same joints by matrices and by quaternions: rounding alone",
+            "the same joints by matrices and by quaternions: rounding only",
         ),
         single.row(
-            "equations 9 to 38, mended, single precision",
+            "equations 9 to 38, corrected, single precision",
             Source::ThisRun,
-            "all solutions; its median is of the size of the paper's figures",
+            "all solutions; its median is comparable to the values of the paper",
         ),
         single_floor.row(
             "forward kinematics in single precision",
             Source::Limit,
-            "against double precision at the same joints: rounding alone",
+            "compared with double precision at the same joints: rounding only",
         ),
         stated(
             "pose printed with four decimals",
@@ -188,7 +183,7 @@ pub fn evaluate(count: usize, watch: &Watch<'_>) -> Vec<AccuracyRow> {
             "UR3 repeatability",
             Source::Robot,
             REPEATABILITY_M,
-            "usually quoted, ±0.1 mm: the arm cannot show any of the differences above",
+            "usually quoted, ±0.1 mm: larger than all differences above",
         ),
     ]
 }

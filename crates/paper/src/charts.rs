@@ -1,18 +1,18 @@
-//! The charts of the document, and the tables that are no lists of the report.
+//! The charts of the document, and tables that are not lists of the report.
 
-use needlebench_report::chart::{
+use needlebench_show::Block;
+use needlebench_show::chart::{
     Axis, Chart, Curve as Line, DotMark, DotRow, Entry, Marker, Paint, bar_plot, curve_plot,
     dot_plot,
 };
-use needlebench_report::number::{duration, percent, power_of_ten, rounded, short};
-use needlebench_report::table::Block;
+use needlebench_show::number::{duration, percent, power_of_ten, rounded, short};
 
 use super::accuracy::Source as AccuracySource;
 use super::convergence::{Curve, Point};
 use super::report::PaperReport;
 use super::timing::{Source as TimeSource, TimeRow};
 
-/// The table with a name; none if it is a chart's.
+/// The table with a name; none if the name is that of a chart.
 pub fn table(name: &str, report: &PaperReport) -> Option<Block> {
     match name {
         "well-conditioned poses" => Some(points(name, report, |curve| &curve.well_conditioned)),
@@ -40,10 +40,10 @@ pub fn chart(name: &str, report: &PaperReport) -> Chart {
     }
 }
 
-/// Exact zeros stand at the left end of logarithmic axes.
+/// Exact zeros are at the left end of logarithmic axes.
 const LEAST_POWER: i32 = -18;
 
-/// A mark of a series; `tip` says what it is.
+/// A mark of a series; `tip` describes it.
 fn dot(series: usize, marker: Marker, value: f64, tip: String) -> DotMark {
     let least = 10_f64.powi(LEAST_POWER);
     DotMark {
@@ -86,10 +86,13 @@ fn equations(name: &str, report: &PaperReport) -> Chart {
 fn right_answers(name: &str, report: &PaperReport) -> Chart {
     let groups = report.solver_variants.iter().map(|variant| {
         let label = variant.name.replace(" and ", "\nand ").replace(", ", ",\n");
-        (label.replace(" mended", "\nmended"), vec![variant.right])
+        (
+            label.replace(" corrected", "\ncorrected"),
+            vec![variant.right],
+        )
     });
-    let legend = [(Paint::Series(0), Marker::Square, "right")];
-    let axis = Axis::percent("answers that are right (%)", 1.0);
+    let legend = [(Paint::Series(0), Marker::Square, "correct")];
+    let axis = Axis::percent("correct answers (%)", 1.0);
     bar_plot(name, &groups.collect::<Vec<_>>(), &legend, "", axis)
 }
 

@@ -1,4 +1,4 @@
-//! Equations 9 to 38 as functions, as printed and as mended, and the solver that they make up.
+//! Equations 9 to 38 as functions, as printed and as corrected, and the solver that they make up.
 
 use nalgebra::{RealField, Vector3};
 use needlebench_kinematics::ik::Shoulder;
@@ -28,13 +28,13 @@ pub fn q6<T: RealField + Copy>(target: &Target<T>, q1: T, q5: T, mended: bool) -
     ((-target.o.x * s1 + o_y * c1) / s5).atan2((target.n.x * s1 - target.n.y * c1) / s5)
 }
 
-/// Equation 16: entry (3, 1) of frame 4, from the wanted pose.
+/// Equation 16: entry (3, 1) of frame 4, from the target pose.
 pub fn entry_31<T: RealField + Copy>(target: &Target<T>, q5: T, q6: T) -> T {
     let ((s5, c5), (s6, c6)) = (q5.sin_cos(), q6.sin_cos());
     target.n.z * c5 * c6 - target.a.z * s5 - target.o.z * c5 * s6
 }
 
-/// Equation 17: entry (3, 3) of frame 4, from the wanted pose.
+/// Equation 17: entry (3, 3) of frame 4, from the target pose.
 pub fn entry_33<T: RealField + Copy>(target: &Target<T>, q6: T) -> T {
     let (s6, c6) = q6.sin_cos();
     -target.o.z * c6 - target.n.z * s6
@@ -100,7 +100,7 @@ pub fn mirrored<T: RealField + Copy>([q2, q3]: [T; 2]) -> [T; 2] {
     [T::pi() - q2, -q3]
 }
 
-/// What is mended of the paper's closed form.
+/// The corrections of the paper's closed form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mended {
     /// The sign in equation 11.
@@ -112,7 +112,7 @@ pub struct Mended {
 }
 
 impl Mended {
-    /// Everything that has to be.
+    /// All corrections.
     pub const ALL: Self = Self {
         equation_11: true,
         indices: true,
@@ -120,7 +120,7 @@ impl Mended {
     };
 }
 
-/// One wrist of one shoulder: all that is known before the elbow's sign is chosen.
+/// One wrist of one shoulder: the quantities before the sign of the elbow is chosen.
 #[derive(Debug, Clone, Copy)]
 pub struct Side<T> {
     q1: T,
@@ -172,7 +172,7 @@ impl<T: RealField + Copy> Side<T> {
 
 /// The rows of Table 2, in the order of `Configuration::ALL`; `None` where one does not exist.
 ///
-/// Follows section 4.1 to the letter but for what is mended.
+/// Follows section 4.1 literally, except for the corrections.
 pub fn solve<T: RealField + Copy>(
     arm: &Arm<T>,
     target: &Target<T>,
@@ -193,7 +193,7 @@ pub fn solve<T: RealField + Copy>(
             let beta_right = beta(arm, q3);
             rows[row] = finite(right.joints([alpha(right.r1, right.r2) - beta_right, q3]));
 
-            // With the signed r1 the names Down and Up of the left side change places.
+            // With the signed r1 the names Down and Up of the left side are exchanged.
             let left_sign = if mended.sign_of_r1 {
                 -elbow_sign
             } else {

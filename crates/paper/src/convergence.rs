@@ -1,4 +1,4 @@
-//! How the numerical method does against the distance of its guess, and where it ends.
+//! Convergence of the numerical method by the distance of its guess, and the branch in which it ends.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -8,12 +8,12 @@ use needlebench_kinematics::ik::{
     wrap_angle,
 };
 use needlebench_kinematics::pose_sets::PoseSet;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Chain, Joints, UrGeometry};
+use needlebench_numerics::order::upper_median;
+use needlebench_numerics::random::SplitMix64;
 use serde::Serialize;
 
 use super::Watch;
-use super::accuracy::median;
 use super::dh::Arm;
 use super::equations::{SEED, angle_error, well_conditioned};
 use super::numerical::{
@@ -23,35 +23,35 @@ use super::solver::same_joints;
 
 /// Distances of guesses, rad: every joint is off by up to this.
 const DISTANCES_RAD: [f64; 9] = [0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0, PI];
-/// Steps that are told apart: who gives up after these finds the undamped method worse than it is.
+/// An early step limit: with it the undamped method appears worse than it is.
 const EARLY_STEPS: u32 = 50;
 /// Poses of each set of the convergence table.
 const POSES: usize = 400;
 /// Poses of the histograms of branches.
 const BRANCH_POSES: usize = 1000;
 
-/// The numerical methods that are compared.
+/// The compared numerical methods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Equation 39 as printed (the rest mended).
+    /// Equation 39 as printed (the rest corrected).
     Equation39AsPrinted,
-    /// Equations 39 and 45 mended, undamped.
+    /// Equations 39 and 45 corrected, undamped.
     Mended,
     /// The same with Levenberg-Marquardt damping.
     LevenbergMarquardt,
     /// The library's Gauss-Newton, which stays near its guess.
     LibraryGaussNewton,
-    /// The library's damped solver, which starts again from anywhere.
+    /// The library's damped solver, with restarts from anywhere.
     LibraryDamped,
 }
 
 const METHODS: [(Method, &str); 5] = [
     (Method::Equation39AsPrinted, "equation 39 as printed"),
-    (Method::Mended, "39 and 45 mended, undamped"),
+    (Method::Mended, "39 and 45 corrected, undamped"),
     (Method::LevenbergMarquardt, "the same, Levenberg-Marquardt"),
     (Method::LibraryGaussNewton, "library: Gauss-Newton"),
-    (Method::LibraryDamped, "library: damped, restarted"),
+    (Method::LibraryDamped, "library: damped, with restarts"),
 ];
 
 /// The arm in both notations.
@@ -130,7 +130,7 @@ pub struct Point {
     pub converged: f64,
     /// Share of guesses from which it converges in no more than [`EARLY_STEPS`] steps, 0 to 1.
     pub converged_in_50_steps: f64,
-    /// Share of guesses from which it ends in the branch that the guess was near to, 0 to 1.
+    /// Share of guesses from which it ends in the branch nearest to the guess, 0 to 1.
     pub same_branch: f64,
     /// Mean number of steps of those that converge; null if none does.
     pub mean_iterations: f64,
@@ -145,7 +145,7 @@ pub struct Curve {
     pub all: Vec<Point>,
 }
 
-/// Order of convergence of the mended method.
+/// Order of convergence of the corrected method.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Order {
     /// Median of `ln(e3/e2) / ln(e2/e1)` over the last errors above rounding.
@@ -155,7 +155,7 @@ pub struct Order {
     pub median_error_rad: [f64; 5],
 }
 
-/// Where the mended method ends from one start over random poses.
+/// Where the corrected method ends from one start over random poses.
 #[derive(Debug, Clone, Serialize)]
 pub struct StartReport {
     pub name: &'static str,
@@ -166,7 +166,7 @@ pub struct StartReport {
     pub not_converged: f64,
 }
 
-/// How a choice of the guess decides the branch.
+/// Effect of the guess on the branch.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct SteeringReport {
     pub guess: &'static str,
@@ -178,7 +178,7 @@ pub struct SteeringReport {
     pub wanted_configuration: f64,
 }
 
-/// Iterations of the mended method from guesses at one distance.
+/// Iterations of the corrected method from guesses at one distance.
 #[derive(Debug, Clone, Serialize)]
 pub struct IterationHistogram {
     pub distance_rad: f64,
@@ -198,17 +198,17 @@ pub struct ConvergenceReport {
     pub steering: Vec<SteeringReport>,
 }
 
-/// A start away from every singularity, as the command `ik` takes it.
+/// A start away from every singularity, as in the command `ik`.
 const REGULAR_START: [f64; 6] = [0.1, -1.2, -1.2, -1.0, 1.2, 0.1];
 
-/// The first two are singular at elbow and wrist, as starts that people take often are.
+/// The first two are singular at elbow and wrist, like many common starts.
 const STARTS: [(&str, [f64; 6]); 3] = [
     ("zeros", [0.0; 6]),
     ("upright home", [0.0, -0.5 * PI, 0.0, -0.5 * PI, 0.0, 0.0]),
     ("regular", REGULAR_START),
 ];
 
-/// Measures all of it.
+/// Measures everything.
 pub fn evaluate(watch: &Watch<'_>) -> ConvergenceReport {
     let chain = UrGeometry::UR3.chain();
     let bench = Bench {
@@ -325,8 +325,8 @@ fn order(bench: &Bench<'_>, postures: &[Joints]) -> Order {
     }
     Order {
         samples: orders.len(),
-        median: median(&mut orders),
-        median_error_rad: errors_by_step.map(|mut errors| median(&mut errors)),
+        median: upper_median(&mut orders),
+        median_error_rad: errors_by_step.map(|mut errors| upper_median(&mut errors)),
     }
 }
 
@@ -357,7 +357,7 @@ fn configuration(ended: &Ended) -> Configuration {
     Configuration::of(&UrGeometry::UR3, &Joints::from(ended.joints))
 }
 
-/// Which joints of the guess are those of the wanted solution; the others are the regular start's.
+/// Which joints of the guess are those of the target solution; the others are the regular start's.
 const STEERING: [(&str, &[usize]); 5] = [
     ("regular start", &[]),
     ("q1 as wanted", &[0]),
@@ -366,11 +366,11 @@ const STEERING: [(&str, &[usize]); 5] = [
     ("q1, q2 and q3 as wanted", &[0, 1, 2]),
 ];
 
-/// The last row of the steering table: every joint within this of the wanted one, rad.
+/// The last row of the steering table: every joint within this of the target one, rad.
 const NEAR_RAD: f64 = 0.5;
 
 fn steering(bench: &Bench<'_>, poses: &[Joints]) -> Vec<SteeringReport> {
-    // The wanted solution: any of the pose's, drawn evenly.
+    // The target solution: any of the pose's, sampled uniformly.
     let mut random = SplitMix64::new(SEED + 7);
     let drawn = poses.iter().filter_map(|made_of| {
         let pose = UrGeometry::UR3.base_from_flange(made_of);

@@ -1,12 +1,12 @@
 //! The arm as the paper writes it: products of Denavit-Hartenberg matrices.
 //!
-//! Written apart from the library's kinematics, which use quaternions, so that each checks the
-//! other; generic in the number type, so that single precision can be looked at too.
+//! Independent of the library's kinematics, which use quaternions, so that each verifies the other; generic in
+//! the number type, for single precision.
 
 use nalgebra::{Matrix3, Matrix4, RealField, RowVector4, Vector3};
 use needlebench_kinematics::UrGeometry;
 
-/// Lengths of Table 1, m, with the `d6` that the table leaves out.
+/// Lengths of Table 1, m, with the `d6` that the table omits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arm<T> {
     pub d1: T,
@@ -77,7 +77,7 @@ impl Arm<f64> {
     }
 }
 
-/// A wanted pose of the flange, by the columns of equation 4.
+/// A target pose of the flange, by the columns of equation 4.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Target<T: RealField> {
     pub n: Vector3<T>,
@@ -115,7 +115,7 @@ pub fn origin(frame: &Matrix4<f64>) -> Vector3<f64> {
 
 /// Largest entry of a difference of two poses: m and 1 alike, the paper's "max absolute error".
 pub fn largest_entry(a: &Matrix4<f64>, b: &Matrix4<f64>) -> f64 {
-    // `max` drops a NaN, and what is not a number is not right.
+    // `max` drops a NaN, but a NaN is an error.
     let entries = (a - b).map(|entry| {
         if entry.is_nan() {
             f64::INFINITY

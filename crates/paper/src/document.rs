@@ -1,19 +1,19 @@
-//! What people see of the results: one document, of which a terminal shows some and the page all.
+//! The results as one document: the page shows all of it, a terminal a part.
 //!
-//! `document.md` is its order and its words. After `#` stands a heading; in brackets the name of a chart or of a
-//! table of this crate, with the chart's caption behind; between bars a list of `paper.json`, with the headings of
-//! its columns, and in the next line what stands in them for each of the list. `{format place}` is a figure of
-//! `paper.json`. What follows `>` is for the page alone.
+//! `document.md` has its order and texts. `#` starts a heading; brackets contain the name of a chart or table of this
+//! crate, followed by the caption of the chart; bars enclose a list of `paper.json` with its column headings, and the
+//! next line the cells for each element of the list. `{format place}` is a value of `paper.json`. Lines that start with
+//! `>` are for the page only.
 
-use needlebench_report::number::{duration, percent, short};
 use needlebench_report::page::parts::Part;
-use needlebench_report::table::Block;
+use needlebench_show::Block;
+use needlebench_show::number::{duration, percent, short};
 use serde_json::Value;
 
 use super::charts::{chart, table};
 use super::report::PaperReport;
 
-/// The whole document; `pictures` are those of the configurations, as PNG.
+/// The whole document; `pictures` are the images of the configurations, as PNG.
 pub fn parts(report: &PaperReport, pictures: &[Vec<u8>]) -> Vec<Part> {
     let value = serde_json::to_value(report).expect("has texts for keys");
     let mut parts = Vec::new();
@@ -33,7 +33,8 @@ pub fn parts(report: &PaperReport, pictures: &[Vec<u8>]) -> Vec<Part> {
             parts.extend(configurations.zip(pictures).map(|(each, png)| {
                 let (label, letter, room) = (each.label, each.figure_6, each.room());
                 let elbow_m = each.elbow_m;
-                let caption = format!("{label} (6{letter}): elbow {elbow_m:+.2} m, room at {room}");
+                let caption =
+                    format!("{label} (6{letter}): elbow {elbow_m:+.2} m, free space at {room}");
                 Part::Picture(png.clone(), caption)
             }));
         } else if let Some((name, caption)) =
@@ -70,7 +71,7 @@ fn figure<'v>(place: &str, report: &'v Value) -> &'v Value {
     found.unwrap_or_else(|| panic!("{place} is not in the report"))
 }
 
-/// A text with its figures.
+/// A text with its values.
 fn filled(text: &str, report: &Value) -> String {
     let mut pieces = text.split(['{', '}']);
     let mut out = pieces.next().unwrap_or_default().to_owned();

@@ -1,7 +1,7 @@
-//! Equations 1 to 47, each as printed and as mended, against forward kinematics.
+//! Equations 1 to 47, each as printed and as corrected, against forward kinematics.
 //!
-//! Both forms take the wanted pose and what the paper has computed before; the truth is the joint vector that
-//! made the pose. What the paper prints of each equation, and what is to be said of it, is in `equations.json`.
+//! Both forms take the target pose and what the paper has computed before; the ground truth is the joint vector of
+//! the pose. The printed and corrected form of each equation, with remarks, is in `equations.json`.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -11,8 +11,8 @@ use nalgebra::{
 };
 use needlebench_kinematics::ik::{Configuration, Shoulder, wrap_angle};
 use needlebench_kinematics::pose_sets::PoseSet;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, UrGeometry};
+use needlebench_numerics::random::SplitMix64;
 use serde::{Deserialize, Serialize};
 
 use super::Watch;
@@ -34,7 +34,7 @@ pub struct Errors {
     pub rms: f64,
     /// Share of postures at which the error is above the failure bound or undefined, 0 to 1.
     pub failing: f64,
-    /// Share of postures at which the form has no value, 0 to 1.
+    /// Share of postures at which the form is undefined, 0 to 1.
     pub undefined: f64,
 }
 
@@ -53,7 +53,7 @@ impl Errors {
     }
 }
 
-/// One equation, or a claim beside one, as `equations.json` has it, and what was found of it.
+/// One equation, or a claim about one, from `equations.json`, with its results.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct EquationReport {
     pub number: String,
@@ -61,15 +61,15 @@ pub struct EquationReport {
     /// In a small notation: `_x`, `^x`, `_{..}`, `^{..}`.
     pub as_printed: String,
     pub as_corrected: String,
-    /// Of the printed form: `right`, `needs_another` (right once another equation is mended, or with a
+    /// Of the printed form: `right`, `needs_another` (right once another equation is corrected, or with a
     /// condition), `typo` or `wrong`.
     pub verdict: String,
     pub remark: String,
-    /// What its error is measured in; `m, 1`: largest entry of a difference of pose matrices.
+    /// Unit of its error; `m, 1`: largest entry of a difference of pose matrices.
     pub unit: String,
-    /// Postures on which it is tried: `random`, those that are `well_conditioned`, or exactly `singular`.
+    /// Postures on which it is tested: `random`, those that are `well_conditioned`, or exactly `singular`.
     pub sample: String,
-    /// Which of [`BOUNDS`] it has.
+    /// Its bounds, one of [`BOUNDS`].
     #[serde(skip_serializing)]
     bounds: String,
     /// Postures at which the equation applies.
@@ -85,12 +85,13 @@ pub struct EquationReport {
     /// Bound above which the printed form fails.
     #[serde(skip_deserializing)]
     pub failure_bound: f64,
-    /// The corrected form keeps its bound at every posture.
+    /// The corrected form satisfies its bound at every posture.
     #[serde(skip_deserializing)]
     pub holds: bool,
 }
 
-/// Bounds on errors: one that the mended form keeps at every posture, and one above which the printed form fails.
+/// Bounds on errors: one that the corrected form satisfies at every posture, and one above which the printed form
+/// fails.
 const BOUNDS: [(&str, [f64; 2]); 10] = [
     // A few products of numbers below 1: five times the worst error seen (2e-15).
     ("rounding", [1e-14, 1e-9]),
@@ -104,17 +105,17 @@ const BOUNDS: [(&str, [f64; 2]); 10] = [
     ("first_order", [1e-3, 1e-3]),
     // Curvature over the smallest singular value of a well-conditioned posture.
     ("inverse", [2e-2, 2e-2]),
-    // What one step leaves of a guess's error, which curvature and singular values multiply.
+    // The share of a guess's error that remains after one step, multiplied by curvature and singular values.
     ("one_step", [0.2, 0.2]),
     // A logarithm of an exponential.
     ("logarithm", [1e-13, 1e-9]),
-    // Singular values down to 1e-9 of the largest count, and multiply what rounding leaves.
+    // Singular values down to 1e-9 of the largest count, and amplify rounding.
     ("pseudo_inverse", [1e-12, 1e-6]),
     // Products of lengths below 0.3 m; the printed form fails by 1.
     ("determinant", [1e-15, 0.5]),
 ];
 
-/// Errors of the printed and of the mended form at each posture, by the equation's number; not numbers where a
+/// Errors of the printed and of the corrected form at each posture, by the equation's number; not numbers where a
 /// form is undefined.
 #[derive(Default)]
 struct Trials(BTreeMap<&'static str, [Vec<f64>; 2]>);
@@ -134,7 +135,7 @@ impl Trials {
     }
 }
 
-/// A joint vector with everything that forward kinematics says of it.
+/// A joint vector with the results of forward kinematics.
 struct Posture {
     arm: Arm<f64>,
     /// Joint positions, rad.
@@ -143,7 +144,7 @@ struct Posture {
     links: [Matrix4<f64>; 6],
     /// Frames 0 to 6 in the base frame.
     frames: [Matrix4<f64>; 7],
-    /// The wanted pose: the library's forward kinematics, by quaternions.
+    /// The target pose: the library's forward kinematics, by quaternions.
     pose: Matrix4<f64>,
     target: Target<f64>,
     /// A direction in joint space, each entry uniform in (-1, 1).
@@ -186,7 +187,7 @@ fn random_axis(random: &mut SplitMix64) -> Vector3<f64> {
     Vector3::new(radius * cosine, radius * sine, z)
 }
 
-/// Far from the wrist's, the elbow's and the shoulder's singularity: sines of at least 0.3, and 80 mm.
+/// Far from the singularities of wrist, elbow and shoulder: sines of at least 0.3, and 80 mm.
 pub fn well_conditioned(q: &[f64; 6]) -> bool {
     let forward_m = UrGeometry::UR3.wrist_forward_m(&Joints::from(*q));
     let [elbow, wrist] = [q[2], q[4]].map(|angle| libm::sin(angle).abs());
@@ -209,7 +210,7 @@ fn either_sign(error: impl Fn(f64) -> f64) -> f64 {
     }
 }
 
-/// Equations 1 to 8 and Table 1: forward kinematics and the wanted pose.
+/// Equations 1 to 8 and Table 1: forward kinematics and the target pose.
 fn forward(p: &Posture, trials: &mut Trials) {
     let arm = p.arm;
     let parameters = [
@@ -517,7 +518,7 @@ const SINGULAR_SHARE: usize = 10;
 /// Seed of the random postures.
 pub const SEED: u64 = 20260101;
 
-/// Tries every equation on `count` random postures.
+/// Tests every equation on `count` random postures.
 pub fn evaluate(count: usize, watch: &Watch<'_>) -> Vec<EquationReport> {
     let mut equations: Vec<EquationReport> =
         serde_json::from_str(include_str!("equations.json")).expect("a list of equations");
@@ -545,13 +546,13 @@ pub fn evaluate(count: usize, watch: &Watch<'_>) -> Vec<EquationReport> {
         equation.printed = Errors::new(&printed, failure_bound);
         equation.corrected = Errors::new(&mended, tolerance);
         (equation.tolerance, equation.failure_bound) = (tolerance, failure_bound);
-        // One that nothing tries does not hold.
+        // An untested equation fails.
         equation.holds = !mended.is_empty() && equation.corrected.failing == 0.0;
     }
     equations
 }
 
-/// How far equation 45 as printed is off at one angle.
+/// Error of equation 45 as printed at one angle.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct TurnReport {
     pub angle_rad: f64,
@@ -561,7 +562,7 @@ pub struct TurnReport {
     pub least_length_rad: f64,
 }
 
-/// Tries equation 45 as printed on rotations by 10, 90 and 120 degrees.
+/// Tests equation 45 as printed on rotations by 10, 90 and 120 degrees.
 pub fn turns_as_printed() -> [TurnReport; 3] {
     const AXES: usize = 10_000;
     let mut random = SplitMix64::new(SEED + 11);

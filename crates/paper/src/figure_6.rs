@@ -1,25 +1,25 @@
-//! Figure 6 as pictures: the arm in its eight configurations, with the room that each gains.
+//! Figure 6 as images: the arm in its eight configurations, with the free space gained in each.
 
 use std::sync::Arc;
 use std::thread::ScopedJoinHandle;
 
 use nalgebra::{Point2, Point3, Vector3};
-use needlebench_cell::ResolvedScenario;
 use needlebench_kinematics::{Joints, Pose};
 use needlebench_render::{Anchor, Camera, Floor, Image, Label, Line3, SurfaceInstance, render};
 use needlebench_report::picture::configuration::{Backdrop, posture_scene};
 use needlebench_report::picture::voxel_surface;
+use needlebench_scenario::ResolvedScenario;
 
 use super::free_space::{BASE_HEIGHT_M, ConfigurationSpace, Space};
 
 const SIZE_PX: [u32; 2] = [800, 660];
-/// Translucent green of the gained room.
+/// Translucent green of the gained free space.
 const GAINED: [f32; 4] = [0.1, 0.62, 0.35, 0.2];
 const NEEDLE: [f32; 4] = [0.82, 0.2, 0.1, 1.0];
-/// What of the needle's line is shown behind the guide and ahead of it, m.
+/// Length of the needle axis shown behind and ahead of the guide, m.
 const NEEDLE_SHOWN_M: [f64; 2] = [0.12, 0.086];
 
-/// All eight pictures, each with its file name.
+/// All eight images, each with its file name.
 pub fn pictures(resolved: &ResolvedScenario, space: &Space) -> Vec<(String, Image)> {
     let (camera, backdrop) = (&camera(resolved, space), &Backdrop::new(resolved));
     std::thread::scope(|scope| {
@@ -39,13 +39,13 @@ pub fn pictures(resolved: &ResolvedScenario, space: &Space) -> Vec<(String, Imag
             .collect();
         let drawn = threads.into_iter().map(ScopedJoinHandle::join);
         drawn
-            .map(|image| image.expect("drawing does not panic"))
+            .map(|image| image.expect("rendering does not panic"))
             .collect()
     })
 }
 
-/// One camera for all, so that pictures can be compared: from the patient's far side and feet,
-/// where Figure 6 is seen from, a little above.
+/// One camera for all images, so that they can be compared: from the patient's far side and feet, as in Figure 6,
+/// slightly from above.
 fn camera(resolved: &ResolvedScenario, space: &Space) -> Camera {
     let cell = &resolved.cell;
     let mut points = Vec::new();
@@ -86,7 +86,7 @@ fn picture(
         "{}\nelbow {:+.2} m",
         configuration.label, configuration.elbow_m
     );
-    let room = format!("room: {}", configuration.room());
+    let room = format!("free space: {}", configuration.room());
     let labels = [(elbow, Anchor::TopLeft), (room, Anchor::BottomLeft)];
     scene
         .labels

@@ -1,14 +1,16 @@
-//! Figure 6 in numbers: how high the arm stands, where it leaves room, and what roll about the needle changes.
+//! Figure 6 in numbers: heights of the arm, free space around it, and the effect of roll about the needle.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::Path;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use needlebench_cell::{BodyKind, Cell, Finding, Overrides, ResolvedScenario, resolve_scenario};
+use needlebench_cell::{BodyKind, Cell};
 use needlebench_evaluation::room::{Obstacles, VoxelGrid};
+use needlebench_input::Finding;
 use needlebench_kinematics::ik::closed_form;
 use needlebench_kinematics::{Joints, UrGeometry};
+use needlebench_scenario::{Overrides, ResolvedScenario, resolve_scenario};
 use serde::Serialize;
 
 use super::dh::{Arm, origin};
@@ -20,10 +22,10 @@ use super::{PaperError, Watch};
 /// Height of the base plane in the world, m.
 pub const BASE_HEIGHT_M: f64 = 0.8;
 
-/// The shipped UR3 on a column with a shipped tool; the world's x and y are the controller's.
+/// The bundled UR3 on a column with a bundled tool; the world's x and y are the controller's.
 ///
 /// # Errors
-/// Findings about the shipped models, which would be our own bug.
+/// Findings about the bundled models, which are a bug in needlebench.
 pub fn resolve(tool: &str) -> Result<ResolvedScenario, Vec<Finding>> {
     let text = format!(
         "name = \"paper\"\nseed = {SEED}\n\
@@ -36,9 +38,9 @@ pub fn resolve(tool: &str) -> Result<ResolvedScenario, Vec<Finding>> {
     resolve_scenario("builtin:paper", &text, Path::new(""), &Overrides::default())
 }
 
-/// Where a doctor may want room, seen from the guide's exit. The patient lies as in
-/// `scenarios/table3.toml`: across in front of the robot, head towards the base's +x, which is the
-/// left hand of whoever looks from the robot to the patient.
+/// Regions that the physician may use, seen from the guide's exit. Patient position as in
+/// `scenarios/table3.toml`: across in front of the robot, head towards the base's +x, which is on the
+/// left seen from the robot to the patient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Region {
@@ -48,7 +50,7 @@ pub enum Region {
     FeetRight,
     /// `y` below the guide's: across the patient.
     FarSide,
-    /// `y` above the guide's: where the robot stands.
+    /// `y` above the guide's: the side of the robot.
     RobotSide,
     /// Higher than the guide's entry.
     Above,
@@ -84,20 +86,20 @@ impl Region {
 #[derive(Debug, Clone, Serialize)]
 pub struct ConfigurationSpace {
     pub label: &'static str,
-    /// Picture of the paper's Figure 6 by its own label, `a` to `h`.
+    /// Panel of the paper's Figure 6, `a` to `h`.
     pub figure_6: &'static str,
     pub joints_rad: [f64; 6],
-    /// Heights of the origins of DH frames 1 to 6 over the base plane, m.
+    /// Heights of the origins of DH frames 1 to 6 above the base plane, m.
     pub joint_heights_m: [f64; 6],
     pub lowest_joint_m: f64,
-    /// Height of the elbow's axis, m.
+    /// Height of the elbow axis, m.
     pub elbow_m: f64,
     /// Lowest and highest point of the arm's and tool's collision shapes beyond the base link, m.
     pub lowest_surface_m: f64,
     pub highest_surface_m: f64,
-    /// Share of each region that is farther than the margin from arm and tool, 0 to 1.
+    /// Free share of each region, farther than the margin from arm and tool, 0 to 1.
     pub free: BTreeMap<Region, f64>,
-    /// Volume free here but taken in at least half of the other configurations, m^3.
+    /// Volume free here but occupied in at least half of the other configurations, m^3.
     pub gained_m3: BTreeMap<Region, f64>,
     /// Regions in which it gains at least a fifth more than the mean of all configurations, most
     /// first; if there is none, the one where it gains most against the mean.
@@ -105,7 +107,7 @@ pub struct ConfigurationSpace {
 }
 
 impl ConfigurationSpace {
-    /// Names of the regions with room.
+    /// Names of the regions with gained free space.
     pub fn room(&self) -> String {
         let name = |region: &Region| REGIONS[*region as usize].1;
         self.room_is_left
@@ -116,20 +118,20 @@ impl ConfigurationSpace {
     }
 }
 
-/// How the needle line of the pose can be held, by the roll about it.
+/// Postures on the needle axis of the pose, by the roll about it.
 #[derive(Debug, Clone, Serialize)]
 pub struct RollReport {
     pub tool: String,
-    /// Steps over the whole circle.
+    /// Number of steps over 360 deg.
     pub steps: usize,
     pub fewest_solutions: usize,
     pub most_solutions: usize,
-    /// Lowest joint over the base plane: of the worst and of the best solution over all rolls, m.
+    /// Lowest joint above the base plane: of the worst and of the best solution over all rolls, m.
     pub lowest_joint_worst_m: f64,
     pub lowest_joint_best_m: f64,
     /// Largest motion of joints 1 to 5 over all rolls within a configuration, rad.
     pub other_joints_move_rad: f64,
-    /// Roll turns wrist 3 and nothing else.
+    /// Roll rotates wrist 3 only.
     pub roll_is_wrist_3: bool,
 }
 
@@ -140,7 +142,7 @@ pub struct FreeSpaceReport {
     pub box_half_width_m: f64,
     pub box_height_m: f64,
     pub cell_m: f64,
-    /// Points nearer to the arm than this are taken.
+    /// Points closer to the arm than this are occupied.
     pub margin_m: f64,
     pub guide_exit_m: [f64; 3],
     pub configurations: Vec<ConfigurationSpace>,
@@ -153,14 +155,14 @@ const BOX_HEIGHT_M: f64 = 0.8;
 const CELL_M: f64 = 0.025;
 /// Cubes across and up the box.
 const CELLS: [usize; 3] = [48, 48, 32];
-/// Room for a hand or a forearm.
+/// Margin for a hand or a forearm.
 const MARGIN_M: f64 = 0.1;
 
-/// What pictures need besides the numbers.
+/// Data of the images, besides the numbers.
 pub struct Space {
     pub report: FreeSpaceReport,
     pub grid: VoxelGrid,
-    /// By configuration: cells that are free here but taken in at least half of the others.
+    /// By configuration: cells that are free here but occupied in at least half of the others.
     pub gained: Vec<Vec<bool>>,
 }
 
@@ -257,9 +259,9 @@ pub fn measure(
     })
 }
 
-/// A region has room if a configuration gains this many times the mean there.
+/// A region counts as gained if a configuration gains this many times the mean there.
 const HAS_ROOM: f64 = 1.2;
-/// Regions where configurations gain less than this on average do not tell them apart, m^3.
+/// Regions with a smaller mean gain do not distinguish configurations, m^3.
 const LEAST_MEAN_M3: f64 = 1e-3;
 
 /// See [`ConfigurationSpace::room_is_left`].
@@ -292,7 +294,7 @@ fn lowest(heights_m: [f64; 6]) -> f64 {
 /// Fineness of curved collision shapes, m.
 const CHORD_ERROR_M: f64 = 1e-3;
 
-/// Lowest and highest point of all that moves, m.
+/// Lowest and highest point of all moving bodies, m.
 fn surface_heights_m(cell: &Cell, q: &Joints) -> [f64; 2] {
     let mut bounds = [f64::INFINITY, f64::NEG_INFINITY];
     for (body, pose) in cell.bodies.iter().zip(cell.world_from_bodies(q)) {
@@ -313,13 +315,13 @@ fn surface_heights_m(cell: &Cell, q: &Joints) -> [f64; 2] {
     bounds
 }
 
-/// Rolls tried about the needle.
+/// Number of rolls about the needle.
 const ROLL_STEPS: usize = 360;
 
 /// Tools that hold the needle in different ways.
 const TOOLS: [&str; 3] = ["offset", "perpendicular", "inline"];
 
-/// What roll about the needle of the paper's pose changes, with a shipped tool.
+/// Effect of roll about the needle at the paper's pose, with a bundled tool.
 fn roll(name: &str) -> Result<RollReport, PaperError> {
     let tool = resolve(name)?.cell.tool;
     let flange_from_guide = tool.flange_from_guide_exit;
@@ -358,7 +360,7 @@ fn roll(name: &str) -> Result<RollReport, PaperError> {
         lowest_joint_worst_m: worst,
         lowest_joint_best_m: best,
         other_joints_move_rad,
-        // Rounding of the closed form, nothing else.
+        // Rounding of the closed form only.
         roll_is_wrist_3: other_joints_move_rad < 1e-9,
     })
 }

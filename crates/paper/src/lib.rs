@@ -2,8 +2,8 @@
 //! puncturing robot positioning*.
 //!
 //! Table 3 under its true labels, every equation as printed and as corrected, accuracy and time of
-//! both methods, convergence of the numerical one, and Figure 6. Everything is computed when it is
-//! asked for, from fixed seeds: two runs differ in their timings only.
+//! both methods, convergence of the numerical one, and Figure 6. Everything is recomputed in each run, from fixed
+//! seeds: two runs differ in their timings only.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod accuracy;
@@ -27,23 +27,23 @@ use std::time::Instant;
 
 use needlebench_bench::progress::Progress;
 use needlebench_bench::provenance::provenance;
-use needlebench_cell::Finding;
 use needlebench_evaluation::report::Verdict;
+use needlebench_input::Finding;
 use needlebench_render::{Image, tile};
 use needlebench_report::files::{FilesError, Folder};
 use needlebench_report::page::parts::{Part, parts_page};
-use needlebench_report::table::blocks_text;
+use needlebench_show::blocks_text;
 
 pub use report::PaperReport;
 
-/// Why there is no result.
+/// Failures of the reproduction.
 #[derive(Debug, thiserror::Error)]
 pub enum PaperError {
-    /// Somebody asked to stop.
+    /// It was interrupted.
     #[error("interrupted")]
     Interrupted,
-    /// A shipped model does not resolve: our own bug.
-    #[error("the shipped robot or tool cannot be used: {0}")]
+    /// A bundled model does not resolve: a bug in needlebench.
+    #[error("the bundled robot or tool cannot be used: {0}")]
     Model(String),
 }
 
@@ -54,11 +54,11 @@ impl From<Vec<Finding>> for PaperError {
     }
 }
 
-/// Who watches a run: progress, and whether to go on.
+/// Progress and interruption of a run.
 pub struct Watch<'a> {
-    /// Set when somebody asks to stop.
+    /// Set by an interrupt.
     pub cancel: &'a AtomicBool,
-    /// Is told how far it is.
+    /// Receives the progress.
     pub progress: &'a dyn Progress,
 }
 
@@ -77,7 +77,7 @@ impl Watch<'_> {
         self.check()
     }
 
-    /// Items until somebody asks to stop: what is made of fewer does not get beyond the stage.
+    /// Items until an interrupt: incomplete results do not leave the stage.
     fn each<I: IntoIterator>(&self, items: I) -> impl Iterator<Item = I::Item> {
         items.into_iter().take_while(|_| self.check().is_ok())
     }
@@ -92,11 +92,11 @@ const STAGES: u64 = 8;
 /// Columns of the sheet with all configurations.
 const SHEET_COLUMNS: usize = 4;
 
-/// Results and pictures of a run.
+/// Results and images of a run.
 pub struct Reproduction {
-    /// Every number.
+    /// All results.
     pub report: PaperReport,
-    /// File name and picture, by configuration; none if they are not wanted.
+    /// File name and image, by configuration; none if not requested.
     pub pictures: Vec<(String, Image)>,
 }
 
@@ -122,7 +122,7 @@ pub fn reproduce(pictures: bool, watch: &Watch<'_>) -> Result<Reproduction, Pape
     watch.stage("free space")?;
     let resolved = free_space::resolve("offset")?;
     let space = free_space::measure(&resolved, &table_3, watch)?;
-    watch.stage("drawing")?;
+    watch.stage("images")?;
     let pictures = if pictures {
         figure_6::pictures(&resolved, &space)
     } else {
@@ -168,10 +168,10 @@ impl Reproduction {
         blocks_text(parts.iter().filter_map(Part::block))
     }
 
-    /// Writes pictures, page and report, and the names of the files into the report.
+    /// Writes images, page and report, and adds the file names to the report.
     ///
     /// # Errors
-    /// What cannot be written.
+    /// A file cannot be written.
     pub fn write(&mut self, folder: Folder<'_>) -> Result<(), FilesError> {
         let mut pictures = Vec::new();
         let mut sheet = Vec::new();

@@ -1,5 +1,5 @@
-//! Equations 39 to 47 as functions, as printed and as mended, and the numerical method that they make up: as
-//! printed, mended, and damped.
+//! Equations 39 to 47 as functions, as printed and as corrected, and the numerical method that they make up: as
+//! printed, corrected, and damped.
 
 use nalgebra::{Matrix3, Matrix4, Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
 use needlebench_kinematics::ik::wrap_angle;
@@ -9,7 +9,7 @@ use super::dh::{Arm, origin, rotation};
 
 /// A function that gives a Jacobian from frames 0 to 6: m and 1 per rad.
 pub type Jacobian = fn(&[Matrix4<f64>; 7]) -> Matrix6<f64>;
-/// A function that gives the rotation vector from an actual to a wanted orientation, rad.
+/// A function that gives the rotation vector from an actual to a target orientation, rad.
 pub type Turn = fn(&Matrix3<f64>, &Matrix3<f64>) -> Vector3<f64>;
 
 /// Six numbers from their halves.
@@ -33,7 +33,7 @@ pub fn jacobian_printed(frames: &[Matrix4<f64>; 7]) -> Matrix6<f64> {
     jacobian_with_axes_from(frames, 1)
 }
 
-/// Equation 39 mended: `J_w = [z_0 ... z_5]`.
+/// Equation 39 corrected: `J_w = [z_0 ... z_5]`.
 pub fn jacobian(frames: &[Matrix4<f64>; 7]) -> Matrix6<f64> {
     jacobian_with_axes_from(frames, 0)
 }
@@ -49,7 +49,7 @@ pub fn turn_printed(wanted: &Matrix3<f64>, actual: &Matrix3<f64>) -> Vector3<f64
     vee(&((wanted - actual) * actual.transpose()))
 }
 
-/// Equation 45 mended: `vee(log(R_d R_0^T))`, in the base frame, rad.
+/// Equation 45 corrected: `vee(log(R_d R_0^T))`, in the base frame, rad.
 pub fn turn(wanted: &Matrix3<f64>, actual: &Matrix3<f64>) -> Vector3<f64> {
     let relative = Rotation3::from_matrix_unchecked(wanted * actual.transpose());
     rotation_vector(&UnitQuaternion::from_rotation_matrix(&relative))
@@ -88,7 +88,7 @@ pub fn printed_pseudo_inverse_step(
     Some(jacobian.transpose() * inverse * dx)
 }
 
-/// Where an iteration that has converged ended.
+/// Final state of a converged iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ended {
     /// Joint positions, rad, wrapped.
@@ -96,9 +96,9 @@ pub struct Ended {
     pub steps: u32,
 }
 
-/// Position (m) and orientation (rad) error at which an iteration is content.
+/// Position (m) and orientation (rad) error at which an iteration has converged.
 pub const CONTENT: f64 = 1e-9;
-/// Steps after which an iteration gives up. The undamped one wanders before it converges: from anywhere
+/// Step limit of an iteration. The undamped one may wander before it converges: from arbitrary guesses
 /// it needs more than 50 in one of twelve cases that converge, more than these in one of 200.
 const STEPS: u32 = 200;
 
@@ -111,8 +111,8 @@ fn plus(joints: &[f64; 6], step: &Vector6<f64>) -> [f64; 6] {
     std::array::from_fn(|i| wrap_angle(joints[i] + step[i]))
 }
 
-/// Equation 47 repeated, with the angles of the log map, down to `content`; calls `visit` with every joint
-/// vector on the way.
+/// Equation 47 iterated with the angles of the log map, down to `content`; calls `visit` with every joint
+/// vector.
 pub fn gauss_newton(
     arm: &Arm<f64>,
     wanted: &Matrix4<f64>,
@@ -138,7 +138,7 @@ pub fn gauss_newton(
     None
 }
 
-/// Length that counts as much as a radian, m: half of the arm's reach, about.
+/// Length equivalent to a radian, m: about half of the arm's reach.
 const LENGTH_M: f64 = 0.25;
 
 /// Levenberg's and Marquardt's damping on the same Jacobian and the same error, with Nielsen's

@@ -1,4 +1,4 @@
-//! What the paper prints: the pose of section 5, Table 3, and the figures of its evaluation.
+//! Printed values of the paper: the pose of section 5, Table 3, and the results of its evaluation.
 
 use nalgebra::Matrix4;
 
@@ -38,7 +38,7 @@ pub const JOINTS_RAD: [[f64; 6]; 8] = [
     [1.756916, 5.568666, 0.827187, -5.57773, 1.423566, 2.775645],
 ];
 
-/// Pictures of Figure 6, `a` to `h`, by their labels.
+/// Panels of Figure 6, `a` to `h`, by their labels.
 pub const FIGURE_6: [(&str, &str); 8] = [
     ("a", "Left-Up-Unfold"),
     ("b", "Left-Up-Fold"),

@@ -1,7 +1,7 @@
 //! The results as one document: `paper.json`.
 
 use needlebench_evaluation::report::{Provenance, Verdict as Outcome};
-use needlebench_report::number::percent;
+use needlebench_show::number::percent;
 use serde::Serialize;
 
 use super::accuracy::AccuracyRow;
@@ -12,7 +12,7 @@ use super::solver::{CountReport, VariantReport};
 use super::table_3::Table3Report;
 use super::timing::Timings;
 
-/// One thing that has to be so.
+/// A requirement and its result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Check {
     pub name: &'static str,
@@ -27,7 +27,7 @@ pub struct Citation {
     pub title: &'static str,
 }
 
-/// Everything that was reproduced. SI units; shares are 0 to 1; a figure that is no number is null.
+/// All results. SI units; shares are 0 to 1; values that are not numbers are null.
 #[derive(Debug, Clone, Serialize)]
 pub struct PaperReport {
     /// Version of this layout.
@@ -36,9 +36,9 @@ pub struct PaperReport {
     pub paper: Citation,
     /// Whether all checks are met.
     pub verdict: Outcome,
-    /// What is checked.
+    /// The checks.
     pub checks: Vec<Check>,
-    /// Table 3 beside its recomputation.
+    /// Table 3, with its recomputation.
     pub table_3: Table3Report,
     /// Each equation as printed and as corrected.
     pub equations: Vec<EquationReport>,
@@ -46,7 +46,7 @@ pub struct PaperReport {
     pub equation_45: [TurnReport; 3],
     /// The closed form with some equations as printed.
     pub solver_variants: Vec<VariantReport>,
-    /// How many solutions poses have.
+    /// Numbers of solutions of poses.
     pub solution_counts: CountReport,
     /// Errors of both methods.
     pub accuracy: Vec<AccuracyRow>,
@@ -54,9 +54,9 @@ pub struct PaperReport {
     pub convergence: ConvergenceReport,
     /// Figure 6 in numbers.
     pub free_space: FreeSpaceReport,
-    /// Files written beside this one.
+    /// Other written files.
     pub files: Vec<String>,
-    /// Where the numbers come from.
+    /// Provenance of the results.
     pub provenance: Provenance,
     /// Times; the only part that differs between two runs.
     pub timings: Timings,
@@ -66,12 +66,12 @@ pub struct PaperReport {
 const SHARE: f64 = 0.015;
 
 impl PaperReport {
-    /// Whether everything is as it has to be.
+    /// Whether all requirements are met.
     pub fn passes(&self) -> bool {
         self.verdict == Outcome::Pass
     }
 
-    /// What has to be so.
+    /// The requirements.
     pub(super) fn checks(&self) -> Vec<Check> {
         let table = &self.table_3;
         let broken = |keeps: fn(&EquationReport) -> bool| {
@@ -101,35 +101,35 @@ impl PaperReport {
                 "Table 3 is reproduced",
                 table.matches,
                 format!(
-                    "largest difference {:.1e} rad of {:.0e} rad allowed",
+                    "largest difference {:.1e} rad, limit {:.0e} rad",
                     table.largest_difference_rad, table.tolerance_rad
                 ),
             ),
             check(
-                "labels of rows 3 to 6 are swapped, those of the others right",
+                "labels of rows 3 to 6 are swapped, those of the others correct",
                 table.swapped_rows == [3, 4, 5, 6],
                 format!("swapped: {:?}", table.swapped_rows),
             ),
             check(
-                "every corrected equation holds within its tolerance",
+                "every corrected equation is within its tolerance",
                 not_holding.is_empty(),
-                format!("broken: {}", list(&not_holding)),
+                format!("violated: {}", list(&not_holding)),
             ),
             check(
-                "an equation called right never fails as printed, another does",
+                "printed equations fail if and only if they are not marked right",
                 not_confirmed.is_empty(),
                 format!("not confirmed: {}", list(&not_confirmed)),
             ),
             check(
-                "solver variants are right as often as the errata say",
+                "solver variants have the success rates of the errata",
                 off.is_empty(),
-                format!("off by more than {SHARE}: {}", list(&off)),
+                format!("difference above {SHARE}: {}", list(&off)),
             ),
             check(
-                "the corrected solver is always right and finds the joints that made the pose",
+                "the corrected solver is always correct and finds the joints of the pose",
                 mended.right == 1.0 && mended.finds_the_joints == 1.0,
                 format!(
-                    "right {}, found for {} of poses",
+                    "correct {}, found for {} of poses",
                     percent(mended.right),
                     percent(mended.finds_the_joints)
                 ),

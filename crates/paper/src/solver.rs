@@ -1,11 +1,11 @@
-//! The paper's closed form as a whole: as printed and mended step by step, and how many of its answers are right.
+//! The paper's closed form as a whole: as printed and corrected step by step, and the share of its correct answers.
 
 use std::collections::BTreeMap;
 
 use needlebench_kinematics::ik::closed_form;
 use needlebench_kinematics::pose_sets::PoseSet;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, UrGeometry};
+use needlebench_numerics::random::SplitMix64;
 use serde::Serialize;
 
 use super::Watch;
@@ -13,7 +13,7 @@ use super::closed_form::{Mended, solve};
 use super::dh::{Arm, Target, largest_entry};
 use super::equations::{SEED, angle_error};
 
-/// How a variant of the closed form did on random poses.
+/// Results of a variant of the closed form on random poses.
 #[derive(Debug, Clone, Serialize)]
 pub struct VariantReport {
     pub name: &'static str,
@@ -27,33 +27,33 @@ pub struct VariantReport {
     pub expected: f64,
 }
 
-/// How many joint vectors reach random poses.
+/// Numbers of solutions of random poses.
 #[derive(Debug, Clone, Serialize)]
 pub struct CountReport {
     pub poses: usize,
     /// Share of poses with this many solutions, 0 to 1, by the library's closed form.
     pub share_by_count: BTreeMap<usize, f64>,
     pub mean: f64,
-    /// Poses for which the mended equations and the library count differently.
+    /// Poses for which the corrected equations and the library count differently.
     pub disagreements: usize,
 }
 
-/// A returned joint vector is right below this error of the pose's entries: wrong ones are off by
+/// A returned joint vector is correct below this error of the pose entries: wrong ones have errors of
 /// centimetres.
 const RIGHT: f64 = 1e-6;
-/// The joints that made a pose are found below this difference, rad.
+/// The joints of a pose count as found below this difference, rad.
 const SAME_JOINTS_RAD: f64 = 1e-5;
 
-/// Name, whether equation 11, the indices and the sign of `r1` are mended, and the errata's share.
+/// Name, whether equation 11, the indices and the sign of `r1` are corrected, and the errata's share.
 const VARIANTS: [(&str, [bool; 3], f64); 4] = [
     ("as printed", [false, false, false], 0.0),
-    ("equation 11 mended", [true, false, false], 0.486),
+    ("equation 11 corrected", [true, false, false], 0.486),
     (
-        "equation 11 and the indices of 36 mended",
+        "equation 11 and the indices of 36 corrected",
         [true, true, false],
         0.913,
     ),
-    ("equation 11 mended, r1 signed", [true, true, true], 1.0),
+    ("equation 11 corrected, r1 signed", [true, true, true], 1.0),
 ];
 
 /// Tries all variants on `count` random poses.
@@ -109,7 +109,7 @@ pub fn evaluate(count: usize, watch: &Watch<'_>) -> (Vec<VariantReport>, CountRe
     (variants.collect(), counts)
 }
 
-/// Whether two joint vectors are the same but for whole turns.
+/// Whether two joint vectors are 2 pi equivalents.
 pub fn same_joints(a: &[f64; 6], b: &Joints) -> bool {
     let mut pairs = a.iter().zip(b.iter());
     pairs.all(|(a, b)| angle_error(*a, *b) < SAME_JOINTS_RAD)

@@ -1,4 +1,4 @@
-//! Table 3: the eight configurations of the paper's pose, under their true labels.
+//! Table 3: the eight configurations of the paper's pose, with their correct labels.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +12,7 @@ use super::dh::{Arm, Target, largest_entry, origin, rotation};
 use super::numerical::turn;
 use super::printed::{JOINTS_RAD, LABELS, ROTATION_VECTOR_RAD, T_DESIRED};
 
-/// One configuration beside the printed row that it is.
+/// One configuration with its printed row.
 #[derive(Debug, Clone, Serialize)]
 pub struct RowReport {
     /// True label, by Table 2.
@@ -25,7 +25,7 @@ pub struct RowReport {
     pub label_is_right: bool,
     pub printed_joints_rad: [f64; 6],
     pub printed_joints_wrapped_rad: [f64; 6],
-    /// Joints printed outside the robot's range of two turns either way, counted from 1.
+    /// Joints printed outside the robot's range of ±2π, counted from 1.
     pub printed_outside_two_turns: Vec<usize>,
     pub difference_rad: [f64; 6],
     /// Pose of the printed row against the printed pose.
@@ -53,20 +53,20 @@ pub struct PoseReport {
     pub projection_moves_joints_rad: f64,
     /// Largest joint change from the exact pose to the printed one as it stands, rad.
     pub unprojected_moves_joints_rad: f64,
-    /// Distance by which row 1 misses the printed pose with the `d6 = 0` of Table 1, m.
+    /// Position error of row 1 to the printed pose with the `d6 = 0` of Table 1, m.
     pub without_d6_m: f64,
     /// Largest coordinate of that, m.
     pub without_d6_largest_coordinate_m: f64,
-    /// Distance by which it misses with positive `a2` and `a3`, m.
+    /// The same with positive `a2` and `a3`, m.
     pub with_positive_lengths_m: f64,
-    /// Largest component by which the printed rotation vector is off the printed matrix's, rad.
+    /// Largest component of the difference between the printed rotation vector and that of the printed matrix, rad.
     pub rotation_vector_difference_rad: f64,
 }
 
 #[derive(Debug, Clone, Serialize)]
 pub struct Table3Report {
     pub rows: Vec<RowReport>,
-    /// Printed rows whose label is another configuration's.
+    /// Printed rows with the label of another configuration.
     pub swapped_rows: Vec<usize>,
     pub largest_difference_rad: f64,
     /// Bound on the difference.

@@ -1,4 +1,4 @@
-//! Time of both methods on this machine, beside the paper's figures and published solvers'.
+//! Time of both methods on this machine, compared with the paper and published solvers.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -8,18 +8,18 @@ use needlebench_kinematics::ik::{
     closed_form_batch,
 };
 use needlebench_kinematics::pose_sets::PoseSet;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
+use needlebench_numerics::order::upper_median;
+use needlebench_numerics::random::SplitMix64;
 use serde::Serialize;
 
-use super::accuracy::median;
 use super::closed_form::{Mended, solve};
 use super::dh::{Arm, Target};
 use super::equations::SEED;
 use super::numerical::levenberg_marquardt;
 use super::{Watch, printed};
 
-/// Whose figure a time is.
+/// Source of a time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
@@ -46,13 +46,13 @@ pub struct TimeRow {
     pub poses_per_repetition: Option<usize>,
 }
 
-/// The only part of the results that differs between two runs.
+/// The only results that differ between two runs.
 #[derive(Debug, Clone, Serialize)]
 pub struct Timings {
     pub cpu: Option<String>,
     pub optimised_build: bool,
     pub rows: Vec<TimeRow>,
-    /// Wall-clock time of the whole run but for writing, s.
+    /// Wall-clock time of the whole run without writing, s.
     pub run_s: f64,
 }
 
@@ -84,10 +84,10 @@ fn stated(name: &'static str, source: Source, numerical: bool, time_s: f64) -> T
 }
 
 const POSES: usize = 200;
-/// Runs over all poses; the median of their means is reported.
+/// Number of runs over all poses; the median of their means is reported.
 const REPETITIONS: usize = 60;
 
-/// One pose, in the forms that the methods take.
+/// One pose, in the formats of the methods.
 struct Case {
     base_from_flange: Pose,
     base_link_from_flange: Pose,
@@ -97,7 +97,7 @@ struct Case {
     anywhere: Joints,
 }
 
-/// Measures our own methods and puts them beside the others.
+/// Measures the methods of this program, and adds the others.
 pub fn measure(watch: &Watch<'_>) -> Vec<TimeRow> {
     let (geometry, arm) = (UrGeometry::UR3, Arm::<f64>::ur3());
     let chain = geometry.chain();
@@ -139,7 +139,7 @@ pub fn measure(watch: &Watch<'_>) -> Vec<TimeRow> {
             );
             black_box(&answers);
         }),
-        run(watch, "equations 9 to 38 mended, plain", false, || {
+        run(watch, "equations 9 to 38 corrected, plain", false, || {
             for case in &cases {
                 black_box(solve(&arm, black_box(&case.target), Mended::ALL));
             }
@@ -175,7 +175,7 @@ pub fn measure(watch: &Watch<'_>) -> Vec<TimeRow> {
     rows
 }
 
-/// Times something that solves all poses.
+/// Measures the time of a solver for all poses.
 fn run(watch: &Watch<'_>, name: &'static str, numerical: bool, mut solve: impl FnMut()) -> TimeRow {
     let mut times_s = Vec::with_capacity(REPETITIONS);
     for _ in watch.each(0..REPETITIONS) {
@@ -183,7 +183,7 @@ fn run(watch: &Watch<'_>, name: &'static str, numerical: bool, mut solve: impl F
         solve();
         times_s.push(started.elapsed().as_secs_f64() / POSES as f64);
     }
-    let middle_s = median(&mut times_s);
+    let middle_s = upper_median(&mut times_s);
     TimeRow {
         least_s: times_s.first().copied(),
         p90_s: times_s.get(REPETITIONS * 9 / 10).copied(),
@@ -193,7 +193,7 @@ fn run(watch: &Watch<'_>, name: &'static str, numerical: bool, mut solve: impl F
     }
 }
 
-/// Name of the processor, where the system tells.
+/// Name of the processor, if the system provides it.
 pub fn cpu_name() -> Option<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;

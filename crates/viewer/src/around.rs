@@ -1,4 +1,4 @@
-//! The voxels around the target that somebody plans for: they take a second to prepare, and are asked at every drag.
+//! The voxels around the planned target: they take a second to prepare, and are needed at every drag.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -7,7 +7,7 @@ use needlebench_bench::routes::FreeRoutes;
 use needlebench_routing::{Anatomy, Obstacle, RouteRules, VoxelAnatomy, judge};
 use serde::Serialize;
 
-/// The voxels around the target that was asked about last.
+/// The voxels around the target of the last request.
 #[derive(Default)]
 pub(crate) struct LastTarget(Mutex<Option<Arc<Around>>>);
 
@@ -19,30 +19,30 @@ pub(crate) struct Around {
     pub target: Point3<f64>,
     /// The voxels.
     pub anatomy: VoxelAnatomy,
-    /// What they are judged by.
+    /// The path rules.
     pub rules: RouteRules,
-    /// Directions that were judged, once they are.
+    /// Evaluated directions, once they are.
     pub free: OnceLock<FreeRoutes>,
 }
 
-/// How the rules of routes judge a needle.
+/// Result of the path rules for a needle.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judged {
-    /// It breaks none.
+    /// Whether it is admissible.
     pub free: bool,
-    /// The first rule that it breaks, in words.
+    /// The first rule that it violates, in words.
     pub broken: Option<&'static str>,
-    /// What that rule finds and wants, in `unit`.
+    /// The value of that rule, in `unit`.
     pub value: Option<f64>,
-    /// What it may have at most, or has to have at least.
+    /// Its limit.
     pub limit: Option<f64>,
-    /// The limit is the least.
+    /// Whether the limit is a minimum.
     pub is_least: bool,
     /// `m`, `rad` or `1`.
     pub unit: Option<&'static str>,
-    /// Odds of a pneumothorax against a route with none of the terms.
+    /// Odds ratio of a pneumothorax relative to a path without risk factors.
     pub odds_ratio: Option<f64>,
-    /// What of bone, vessels and organs nobody has seen: nothing is said of distances from it.
+    /// Bone, vessels and organs that are not labelled: distances from these are not evaluated.
     pub unknown: Vec<&'static str>,
 }
 
@@ -62,7 +62,7 @@ impl LastTarget {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    /// How a needle is judged, if its target is the one that was asked about last.
+    /// Result of the path rules for a needle, if its target is that of the last request.
     pub(crate) fn judged(
         &self,
         goal: &str,

@@ -1,4 +1,4 @@
-//! Entries for a target: every direction judged by the rules of routes, and the best of them with the robot.
+//! Entries for a target: every direction evaluated by the path rules, and the best of them with the robot.
 //!
 //! The same code as `needlebench ct routes`, with the same numbers.
 
@@ -9,20 +9,20 @@ use needlebench_bench::routes::{
     RoutePlan, RouteTask, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free_routes,
 };
 use needlebench_bench::suggest::SuggestError;
-use needlebench_cell::scenario::{GoalSection, RouteSection};
 use needlebench_imaging::{ImagingError, Remark};
+use needlebench_scenario::scenario::{GoalSection, RouteSection};
 use serde::Serialize;
 
 use crate::around::Around;
 use crate::case::Case;
 use crate::live::{GoalAim, Refusal};
 
-/// Routes to a target.
+/// Needle paths to a target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Entries {
     /// As in `routes.json`.
     pub plan: RoutePlan,
-    /// What is worth knowing of the label map.
+    /// Remarks on the label map.
     pub remarks: Vec<Remark>,
 }
 
@@ -35,10 +35,10 @@ fn rules_of<'a>(
     own.and_then(|goal| goal.route.as_ref()).unwrap_or(usual)
 }
 
-/// Plans the routes to a target: at first by the patient alone, then with the robot. Directions are judged once.
+/// Plans the needle paths to a target: first by the patient alone, then with the robot. Directions are evaluated once.
 ///
 /// # Errors
-/// A target that is none, or is not in the body; `None` if it was interrupted.
+/// An invalid target, or one outside the body; `None` if it was interrupted.
 pub fn entries(
     case: &Case,
     aim: &GoalAim,
@@ -97,11 +97,11 @@ fn task_of<'a>(case: &'a Case, section: &'a GoalSection, usual: &'a RouteSection
     }
 }
 
-/// Reads the voxels around a target, so that a needle to it is judged by the rules of routes even if nobody has asked
-/// for entries. A target that has none is judged by its tissues alone.
+/// Reads the voxels around a target, so that a needle to it is evaluated by the path rules even if entries were not
+/// requested. A target that has none is evaluated by its tissues alone.
 ///
 /// # Errors
-/// A target that is none.
+/// An invalid target.
 pub(crate) fn look_around(
     case: &Case,
     aim: &GoalAim,
@@ -114,7 +114,7 @@ pub(crate) fn look_around(
     Ok(())
 }
 
-/// The voxels around a target: those of the last question if it was about the same.
+/// The voxels around a target: those of the last request if it had the same target.
 fn around(
     case: &Case,
     task: &RouteTask<'_>,

@@ -1,4 +1,4 @@
-//! Who may ask: pages of this server that know its token.
+//! Access control: only pages of this server that have its token.
 
 use std::fmt::Write as _;
 
@@ -48,7 +48,7 @@ impl Hosts {
         Self([format!("127.0.0.1:{port}"), format!("localhost:{port}")])
     }
 
-    /// Refuses who came by another name (a foreign name that was made to lead here) or from another page.
+    /// Rejects requests by another host name (DNS rebinding) or from another origin.
     ///
     /// # Errors
     /// 403 with a sentence.
@@ -57,7 +57,7 @@ impl Hosts {
         let host = hosts.next().and_then(|value| value.to_str().ok());
         let is_own = |name: &str| self.0.iter().any(|own| own == name);
         if !host.is_some_and(is_own) || hosts.next().is_some() {
-            return Err(forbidden("this server is asked by its own address alone"));
+            return Err(forbidden("this server answers only at its own address"));
         }
         for origin in headers.get_all(header::ORIGIN) {
             let origin = origin
@@ -65,13 +65,13 @@ impl Hosts {
                 .ok()
                 .and_then(|text| text.strip_prefix("http://"));
             if !origin.is_some_and(is_own) {
-                return Err(forbidden("pages of other origins may not ask here"));
+                return Err(forbidden("requests from other origins are not allowed"));
             }
         }
         let site = headers.get("sec-fetch-site").map(HeaderValue::as_bytes);
         match site {
             None | Some(b"same-origin" | b"none") => Ok(()),
-            Some(_) => Err(forbidden("pages of other origins may not ask here")),
+            Some(_) => Err(forbidden("requests from other origins are not allowed")),
         }
     }
 }
@@ -80,7 +80,7 @@ fn forbidden(message: &str) -> Problem {
     Problem::new(StatusCode::FORBIDDEN, message)
 }
 
-/// Refuses who does not know the token.
+/// Rejects requests without the token.
 ///
 /// # Errors
 /// 401 with a sentence.
@@ -101,7 +101,7 @@ pub(crate) fn check_token(headers: &HeaderMap, token: &Token) -> Result<(), Prob
 /// Name of the cookie that lets a browser open results, which a link cannot give a token.
 pub(crate) const COOKIE: &str = "needlebench_results";
 
-/// Refuses who has not the cookie.
+/// Rejects requests without the cookie.
 ///
 /// # Errors
 /// 401 with a sentence.

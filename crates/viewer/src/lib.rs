@@ -1,8 +1,7 @@
 //! The planning page on the CT of one patient: a server on this machine alone, and the page that it serves.
 //!
-//! [`Case::open`] reads the folder that `needlebench ct build` made and refuses one whose parts do not belong together;
-//! [`Server`] serves it. What a route is worth is answered by the functions of [`live`] and
-//! [`motion`]; what a person decided is kept by
+//! [`Case::open`] reads the folder that `needlebench ct build` made and rejects one whose parts do not belong together;
+//! [`Server`] serves it. A needle path is evaluated by [`live`] and [`motion`]; the user's decisions are saved by
 //! [`session`].
 //!
 //! Voxels are told by index, places in millimetres of `ct` (patient LPS); the server alone turns one into the other.

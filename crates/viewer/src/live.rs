@@ -1,21 +1,23 @@
-//! What a straight needle from the skin to a target is worth, while somebody drags its ends.
+//! Evaluation of a straight needle path from the skin to a target, while its ends are dragged.
 //!
 //! Pure functions of a case and an [`Aim`]: [`route`] is answered at once from voxels and surfaces, [`reach`] by the
 //! postures of all eight configurations. Lengths in m, angles in rad; places in `ct` (patient LPS).
 
 use nalgebra::{Point3, UnitVector3};
 use needlebench_bench::preview::GoalPreview;
-use needlebench_cell::scenario::{GoalSection, Target};
-use needlebench_cell::{Finding, Goal, part_in_words, reason_in_words};
+use needlebench_cell::{part_in_words, reason_in_words};
 use needlebench_imaging::{SurfaceTissue, VoxelGrid, structure_of};
+use needlebench_input::Finding;
 use needlebench_planning::{crossed_fissures, judged_tissues};
 use needlebench_routing::body_normal;
+use needlebench_scenario::Goal;
+use needlebench_scenario::scenario::{GoalSection, Target};
 use serde::{Deserialize, Serialize};
 
 use crate::around::Judged;
 use crate::case::Case;
 
-/// What the needle is for.
+/// The target of the needle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum TargetAim {
@@ -27,7 +29,7 @@ pub enum TargetAim {
     Index([f64; 3]),
 }
 
-/// Where the needle comes from: the entry is where the line from the target through here leaves the skin.
+/// The entry of the needle: the point where the line from the target through here leaves the skin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum EntryAim {
@@ -41,23 +43,23 @@ pub enum EntryAim {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Aim {
-    /// The goal of the scenario that it is for: what the guide keeps from the skin is that goal's.
+    /// The goal of the scenario that it is for: the guide's stand-off is that goal's.
     #[serde(default)]
     pub goal: Option<String>,
-    /// Where it is to end.
+    /// Its target.
     pub target: TargetAim,
-    /// Where it is to come from.
+    /// Its entry.
     pub entry: EntryAim,
 }
 
-/// What a needle is for, wherever it comes from.
+/// The target of a needle, whatever its entry.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GoalAim {
-    /// The goal of the scenario that it is for: what the guide keeps from the skin is that goal's.
+    /// The goal of the scenario that it is for: the guide's stand-off is that goal's.
     #[serde(default)]
     pub goal: Option<String>,
-    /// Where it is to end.
+    /// Its target.
     pub target: TargetAim,
 }
 
@@ -66,7 +68,7 @@ pub struct GoalAim {
 pub struct Refusal {
     /// What is wrong.
     pub message: String,
-    /// How to mend it.
+    /// How to fix it.
     pub hint: Option<String>,
 }
 
@@ -82,7 +84,7 @@ impl Refusal {
 
 impl From<Finding> for Refusal {
     fn from(finding: Finding) -> Self {
-        // File and key are those of a text that nobody has written yet.
+        // File and key are those of a text that is not written yet.
         Self {
             message: finding.message,
             hint: finding.hint,
@@ -101,7 +103,7 @@ pub struct Needle {
     pub entry_m: Point3<f64>,
     /// Target, `ct`.
     pub target_m: Point3<f64>,
-    /// From where somebody pointed to the entry, along the needle.
+    /// From the chosen point to the entry, along the needle.
     pub entry_moved_m: f64,
 }
 
@@ -116,7 +118,7 @@ pub struct Crossing {
     pub to_m: f64,
 }
 
-/// How a margin is kept.
+/// Clearance of the needle from a tissue, and its margin.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TissueAnswer {
     /// Bone, vessel or organ.
@@ -127,11 +129,11 @@ pub struct TissueAnswer {
     pub words: String,
     /// Signed distance of the needle's surface.
     pub distance_m: f64,
-    /// The least that it has to be.
+    /// The required distance.
     pub margin_m: f64,
-    /// It is.
+    /// Whether the margin is satisfied.
     pub kept: bool,
-    /// How far 99 % of the part's surface are from that of the voxels at most; none where that is not known.
+    /// How far 99 % of the part's surface are from that of the voxels at most; none where it is unknown.
     pub surface_p99_m: Option<f64>,
 }
 
@@ -146,13 +148,13 @@ pub struct RouteAnswer {
     pub target_m: [f64; 3],
     /// The same by index.
     pub target_index: [f64; 3],
-    /// From where somebody pointed to the entry, along the needle: positive outwards.
+    /// From the chosen point to the entry, along the needle: positive outwards.
     pub entry_moved_m: f64,
     /// From entry to target.
     pub length_m: f64,
     /// From the guide's exit to the needle's tip; none where the guide cannot be put there.
     pub insertion_m: Option<f64>,
-    /// Why the guide cannot be put there: nothing is said of what the needle comes near to then.
+    /// Why the guide cannot be placed there; distances from tissues are not evaluated then.
     pub not_placed: Option<Refusal>,
     /// How long the needle is.
     pub needle_m: f64,
@@ -168,38 +170,38 @@ pub struct RouteAnswer {
     pub in_lung_m: Option<f64>,
     /// How often it enters a lung.
     pub lung_entries: Option<usize>,
-    /// Least distances to bone, vessels and organs that are to be kept clear of.
+    /// Least distances to bone, vessels and organs with a margin.
     pub tissues: Vec<TissueAnswer>,
     /// Fissures that it crosses.
     pub fissures: Vec<String>,
-    /// How the rules of routes judge it; none until they were asked about its target.
+    /// Result of the path rules; none until they were evaluated for its target.
     pub judged: Option<Judged>,
-    /// Why no run allows it, in words; none where nothing that was judged refuses it.
+    /// Why a run rejects it, in words; none where no evaluated rule does.
     pub refusal: Option<String>,
 }
 
-/// Which configurations serve.
+/// Which configurations are feasible.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReachAnswer {
-    /// Why nothing is said of the robot.
+    /// Why the robot is not evaluated.
     pub unknown: Option<&'static str>,
-    /// Of twelve directions about the needle only: a configuration that works here works, one that does not may.
+    /// Of twelve roll angles only: a configuration that is feasible here is feasible, others may be.
     pub quick: bool,
     /// The configurations.
     pub preview: Option<GoalPreview>,
-    /// Why each does not work, in words, in their order; empty where it does.
+    /// Why each is infeasible, in words, in their order; empty where it is feasible.
     pub reasons: Vec<String>,
 }
 
-/// Refuses what is asked of a robot of which nobody knows where it is.
+/// Rejects requests on a robot whose position is unknown.
 ///
 /// # Errors
-/// Why nobody knows.
+/// Why it is unknown.
 pub(crate) fn registered(case: &Case) -> Result<(), Refusal> {
     match case.built().not_registered() {
         Some(unknown) => Err(Refusal::new(
             unknown,
-            "planning on the slices works without",
+            "planning on the slices is possible without it",
         )),
         None => Ok(()),
     }
@@ -220,12 +222,13 @@ pub fn needle(case: &Case, aim: &Aim) -> Result<Needle, Refusal> {
     });
     let outwards = UnitVector3::try_new(towards - target, 1e-3).ok_or_else(|| {
         Refusal::new(
-            "entry and target are less than a millimetre apart",
+            "entry and target are less than 1 mm apart",
             "click the entry on the skin",
         )
     })?;
     let placed = case.desk().scenario().phantom.as_ref();
-    let placed = placed.ok_or_else(|| Refusal::new("there is no patient", "build it anew"))?;
+    let placed =
+        placed.ok_or_else(|| Refusal::new("there is no patient", "build the folder again"))?;
     let leaves = placed.phantom.skin_intersection(&target, &outwards);
     let Some((_, leaves_m)) = leaves else {
         return Err(Refusal::new(
@@ -295,7 +298,7 @@ fn finite(numbers: &[f64; 3]) -> Result<Point3<f64>, Refusal> {
         Ok(Point3::from(*numbers))
     } else {
         Err(Refusal {
-            message: "a place has three finite numbers".to_owned(),
+            message: "a position requires three finite numbers".to_owned(),
             hint: None,
         })
     }
@@ -383,7 +386,7 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
     })
 }
 
-/// The tissue whose margin is missed most, or else the rule of routes that is broken.
+/// The tissue whose margin is violated most, or else the path rule that is violated.
 fn refusal(tissues: &[TissueAnswer], judged: Option<&Judged>) -> Option<String> {
     let missed_m = |each: &TissueAnswer| each.distance_m - each.margin_m;
     let refused = tissues.iter().filter(|each| !each.kept);
@@ -395,17 +398,15 @@ fn refusal(tissues: &[TissueAnswer], judged: Option<&Judged>) -> Option<String> 
         ..
     }) = refused.min_by(|a, b| missed_m(a).total_cmp(&missed_m(b)))
     {
-        let [mm, wanted_mm] = [distance_m, margin_m].map(|metres| 1e3 * metres);
+        let [mm, required_mm] = [distance_m, margin_m].map(|metres| 1e3 * metres);
         return Some(if mm < 0.0 {
-            format!("it goes {:.1} mm deep through {words} ({tissue})", -mm)
+            format!("penetration {:.1} mm into {words} ({tissue})", -mm)
         } else {
-            format!(
-                "it passes {words} ({tissue}) at {mm:.1} mm, and {wanted_mm:.1} mm are to be kept"
-            )
+            format!("clearance {mm:.1} mm to {words} ({tissue}), {required_mm:.1} mm required")
         });
     }
     let broken = judged.and_then(|judged| judged.broken)?;
-    Some(format!("by the rules of routes: {broken}"))
+    Some(format!("path rule: {broken}"))
 }
 
 fn surface_p99_m(case: &Case, part: &str) -> Option<f64> {
@@ -477,7 +478,7 @@ fn crossings(case: &Case, from_m: &Point3<f64>, to_m: &Point3<f64>) -> Vec<Cross
     named.map(|(_, crossing)| crossing).collect()
 }
 
-/// Which of the eight configurations reach a needle, by their postures; `quick` looks at few directions about the needle.
+/// Which of the eight configurations are feasible for a needle, by their postures; `quick` checks few roll angles.
 /// The same on any number of threads.
 ///
 /// # Errors

@@ -1,9 +1,10 @@
-//! The motion of one configuration to a needle, and the error that is to be expected at its end.
+//! The motion of one configuration to a needle path, with bias, covariance and RMS tip error at its end.
 
 use nalgebra::{Matrix3, Vector3};
 use needlebench_bench::Desk;
-use needlebench_cell::{Goal, reason_in_words};
+use needlebench_cell::reason_in_words;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_scenario::Goal;
 use needlebench_uncertainty::budget::Moments;
 use serde::Serialize;
 
@@ -20,7 +21,7 @@ pub struct TipError {
     pub covariance_m2: [[f64; 3]; 3],
     /// Root mean square distance.
     pub rms_m: f64,
-    /// Root mean square distance across the needle.
+    /// Root mean square lateral distance.
     pub lateral_rms_m: f64,
 }
 
@@ -29,7 +30,7 @@ pub struct TipError {
 pub struct MotionAnswer {
     /// Label of the configuration.
     pub configuration: &'static str,
-    /// What it breaks, the first failing one first; empty if it works.
+    /// Rules that it violates, the first failing one first; empty if it is feasible.
     pub rejections: Vec<MotionRejection>,
     /// Times of the postures, s.
     pub time_s: Vec<f64>,
@@ -37,13 +38,13 @@ pub struct MotionAnswer {
     pub joints_rad: Vec<[f64; 6]>,
     /// Where it ends, rad.
     pub end_joints_rad: Option<[f64; 6]>,
-    /// The expected error at the target; none where the arm's data do not say enough, or there is no motion.
+    /// The expected error at the target; none where the arm's data are insufficient, or there is no motion.
     pub tip: Option<TipError>,
-    /// Why it is not known.
+    /// Why it is unknown.
     pub tip_unknown: Option<String>,
 }
 
-/// A rule that a motion breaks.
+/// A rule that a motion violates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MotionRejection {
     /// The rule.
@@ -52,9 +53,9 @@ pub struct MotionRejection {
     pub words: String,
     /// Details.
     pub detail: String,
-    /// The value that it looks at.
+    /// The value that it evaluates.
     pub value: f64,
-    /// The limit that it breaks.
+    /// The limit that is violated.
     pub limit: f64,
     /// The unit of both.
     pub unit: &'static str,
@@ -63,7 +64,7 @@ pub struct MotionRejection {
 /// The planned motion of one configuration, and the error that is expected at its end.
 ///
 /// # Errors
-/// As [`needle`]; an unknown configuration; a robot of which nobody knows where it is.
+/// As [`needle`]; an unknown configuration; a robot whose position is unknown.
 pub fn motion(case: &Case, aim: &Aim, configuration: &str) -> Result<MotionAnswer, Refusal> {
     /// Between two postures, s: as in report pages.
     const PERIOD_S: f64 = 0.04;
@@ -72,8 +73,8 @@ pub fn motion(case: &Case, aim: &Aim, configuration: &str) -> Result<MotionAnswe
     let known = known.clone().find(|each| each.label() == configuration);
     let configuration = known.ok_or_else(|| {
         Refusal::new(
-            "there is no such configuration",
-            "one of the eight of the table",
+            "unknown configuration",
+            "choose one of the eight in the table",
         )
     })?;
     let goal = needle(case, aim)?.goal?;
@@ -124,7 +125,7 @@ pub fn motion(case: &Case, aim: &Aim, configuration: &str) -> Result<MotionAnswe
     }
     match desk.expected_error(&goal, trajectory) {
         None => {
-            let unknown = "the data of this arm do not say how accurate it is";
+            let unknown = "this arm has no accuracy data";
             answer.tip_unknown = Some(without.unwrap_or_else(|| unknown.to_owned()));
         }
         Some(Err(finding)) => answer.tip_unknown = Some(finding.message),

@@ -16,11 +16,11 @@ const ROUTES: &str = include_str!("assets/routes.js");
 const SIMULATION: &str = include_str!("assets/simulation.js");
 const PLANNER: &str = include_str!("assets/planner.js");
 
-/// The page asks nobody but this server, runs no script but its own, and is in nobody's frame.
+/// The page connects only to this server, runs only its own scripts, and cannot be framed.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; \
      connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// A report brings its scripts along; it asks nobody for anything.
+/// A report contains its scripts; it makes no requests.
 pub(crate) const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; \
      style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 

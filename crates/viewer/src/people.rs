@@ -1,4 +1,4 @@
-//! What a configuration leaves to the people in the room: space, sight, a cone for the hand.
+//! Free space, line of sight and hand cone of a configuration.
 
 use needlebench_evaluation::room::{RoomModel, RoomReport};
 use needlebench_kinematics::Joints;
@@ -10,7 +10,7 @@ use crate::case::Case;
 use crate::live::{Aim, Refusal, registered};
 use crate::plan_file::{PLAN_FILE, planned};
 
-/// The people at a needle, and what a posture leaves to them.
+/// The people at a needle, and the space and line of sight that a posture leaves to them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PeopleAnswer {
     /// As a run of the plan reports it for this posture.
@@ -22,14 +22,14 @@ pub struct PeopleAnswer {
 /// Measures a posture for the people of the plan, who stand where this needle needs them.
 ///
 /// # Errors
-/// As [`planned`]; joints that are none; a robot of which nobody knows where it is.
+/// As [`planned`]; invalid joints; a robot whose position is unknown.
 pub fn people(case: &Case, aim: &Aim, joints_rad: &[f64; 6]) -> Result<PeopleAnswer, Refusal> {
     /// Beyond all joints' limits, rad.
     const FAR_RAD: f64 = 10.0;
     registered(case)?;
     if !joints_rad.iter().all(|joint| joint.abs() < FAR_RAD) {
         return Err(Refusal::new(
-            "joints are six finite numbers, rad",
+            "joints need six finite numbers, rad",
             "send those of the planned motion",
         ));
     }

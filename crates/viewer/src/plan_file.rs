@@ -1,19 +1,20 @@
-//! The plan as a scenario: the folder's own with the goal that was chosen, in the text that a person wrote.
+//! The plan as a scenario: the folder's own with the chosen goal, in the text that its author wrote.
 
 use std::path::{Path, PathBuf};
 
+use needlebench_bench::ct::SCENARIO_FILE;
 use needlebench_bench::{Control, Runnable};
-use needlebench_cell::scenario::GoalSection;
-use needlebench_cell::{Finding, ResolvedScenario, ScenarioEdit, read_text, resolve_scenario};
+use needlebench_input::{Finding, read_text};
 use needlebench_report::write_atomically;
+use needlebench_scenario::scenario::GoalSection;
+use needlebench_scenario::{ResolvedScenario, ScenarioEdit, resolve_scenario};
 use serde::Deserialize;
 
 use crate::case::Case;
 use crate::entries::look_around;
-use crate::live::{Aim, Refusal, needle, route};
-use needlebench_bench::ct::SCENARIO_FILE;
+use crate::live::{Aim, Refusal, RouteAnswer, needle, route};
 
-/// Its name, unless somebody gives it another.
+/// Its default name.
 pub(crate) const PLAN_FILE: &str = "planned.toml";
 
 /// Decimals of places, mm.
@@ -28,17 +29,17 @@ pub struct Planned {
     pub resolved: ResolvedScenario,
     /// Which of its goals the needle is.
     pub goal: usize,
-    /// Goals of the folder that it does not have, since nobody has given them an entry.
+    /// Goals of the folder that it does not include, as they have no entry.
     pub left_out: Vec<String>,
 }
 
-/// What somebody was asked before a plan is written, and agreed to.
+/// What the user agreed to before a plan is written.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Consent {
     /// A file of another text may be overwritten.
     pub overwrite: bool,
-    /// The needle may be one that is refused; the file says so.
+    /// The needle may be a rejected one; the file is marked so.
     pub refused: bool,
 }
 
@@ -47,9 +48,9 @@ pub struct Consent {
 pub struct Written {
     /// Its file.
     pub path: PathBuf,
-    /// Goals of the folder that it does not have.
+    /// Goals of the folder that it does not include.
     pub left_out: Vec<String>,
-    /// Why its needle is not allowed, where it is not.
+    /// Why its needle is rejected, where it is.
     pub refusal: Option<String>,
 }
 
@@ -65,7 +66,7 @@ pub enum NotWritten {
         /// A name that no file has.
         free: String,
     },
-    /// The needle is not allowed.
+    /// The needle is rejected.
     NotAllowed(String),
 }
 
@@ -77,11 +78,10 @@ impl From<Refusal> for NotWritten {
 
 /// Writes the plan into the case's folder as `NAME.toml`.
 ///
-/// What is written is what [`needlebench run`] takes: it is resolved and checked before. Of a needle that is not allowed
-/// it says so in the file.
+/// It is a scenario for [`needlebench run`], resolved and checked before. A rejected needle is marked in the file.
 ///
 /// # Errors
-/// A name that is none; what keeps the plan from being run; a file that cannot be written; what nobody has agreed to.
+/// An invalid name; what keeps the plan from being run; a file that cannot be written; a missing consent.
 pub fn write_plan(
     case: &Case,
     aim: &Aim,
@@ -93,11 +93,21 @@ pub fn write_plan(
     let file = file_name(name)?;
     let path = case.folder().join(&file);
     look_around(case, &aim.goal_aim(), control)?;
-    let refusal = route(case, aim)?.refusal;
+    let RouteAnswer {
+        refusal, judged, ..
+    } = route(case, aim)?;
     if let Some(refusal) = refusal.as_ref().filter(|_| !consent.refused) {
         return Err(NotWritten::NotAllowed(refusal.clone()));
     }
-    let plan = planned(case, aim, configuration, refusal.as_deref(), &path)?;
+    let remark = match (&refusal, judged) {
+        (Some(why), _) => Some(format!("REJECTED: {why}")),
+        // The scan has no voxels around its target, or they could not be read.
+        (None, None) => {
+            Some("not evaluated by the path rules, only by its distance from tissues".to_owned())
+        }
+        (None, Some(_)) => None,
+    };
+    let plan = planned(case, aim, configuration, remark.as_deref(), &path)?;
     Runnable::checked(plan.resolved).map_err(Refusal::from)?;
     if !consent.overwrite && path.exists() && read_text(&path).ok().as_ref() != Some(&plan.text) {
         return Err(NotWritten::Exists {
@@ -134,16 +144,16 @@ fn free_name(folder: &Path, file: &str) -> String {
         .expect("a folder has few files")
 }
 
-/// The text of the plan for a file, with why its needle is not allowed if it is not, and what it is as a scenario. Other goals of the folder that nobody has given an entry
-/// are left out: a plan has the needles that were planned.
+/// The text of the plan for a file, with a remark on its needle, and what it is as a scenario. Other goals of the
+/// folder without an entry are left out: a plan has the needles that were planned.
 ///
 /// # Errors
-/// What keeps it from being a scenario.
+/// What makes it an invalid scenario.
 pub fn planned(
     case: &Case,
     aim: &Aim,
     configuration: Option<&str>,
-    refusal: Option<&str>,
+    remark: Option<&str>,
     path: &Path,
 ) -> Result<Planned, Refusal> {
     let needle = needle(case, aim)?;
@@ -158,7 +168,7 @@ pub fn planned(
         ),
     })?;
     let mut edit = ScenarioEdit::new(&file, &text)?;
-    edit_goal(&mut edit, case, &needle.section, configuration, refusal)?;
+    edit_goal(&mut edit, case, &needle.section, configuration, remark)?;
     let is_open = |goal: &GoalSection| {
         goal.name != needle.section.name
             && goal.entry_mm.is_none()
@@ -190,7 +200,7 @@ pub fn planned(
     })
 }
 
-/// The file of a name within the folder: never another folder's, and none that something else is kept in.
+/// The file of a name within the folder: never another folder's, and none that is reserved.
 fn file_name(name: &str) -> Result<String, Refusal> {
     let stem = name.strip_suffix(".toml").unwrap_or(name);
     let is_plain = stem
@@ -198,13 +208,13 @@ fn file_name(name: &str) -> Result<String, Refusal> {
         .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
     if stem.is_empty() || stem.len() > 64 || !is_plain {
         return Err(Refusal {
-            message: "that is no name for a plan".to_owned(),
-            hint: Some("letters, digits, `-` and `_`, at most 64".to_owned()),
+            message: "invalid name of a plan".to_owned(),
+            hint: Some("use at most 64 letters, digits, `-` and `_`".to_owned()),
         });
     }
     if ["scenario", "session"].contains(&stem.to_ascii_lowercase().as_str()) {
         return Err(Refusal {
-            message: format!("{stem}.toml is kept for something else"),
+            message: format!("{stem}.toml is reserved"),
             hint: Some("choose another name".to_owned()),
         });
     }
@@ -216,7 +226,7 @@ fn edit_goal(
     case: &Case,
     section: &GoalSection,
     configuration: Option<&str>,
-    refusal: Option<&str>,
+    remark: Option<&str>,
 ) -> Result<(), Finding> {
     let own = case
         .goals()
@@ -253,12 +263,12 @@ fn edit_goal(
         edit.remove(&at, key)?;
     }
     let chosen = configuration.map_or(String::new(), |label| format!(", for {label}"));
-    let refused = refusal.map_or(String::new(), |why| format!("; REFUSED: {why}"));
+    let remark = remark.map_or(String::new(), |remark| format!("; {remark}"));
     let entry = in_mm(section.entry_mm.unwrap_or_default());
     edit.set(
         &at,
         "entry_mm",
-        &format!("{entry} # chosen on the planning page{chosen}{refused}"),
+        &format!("{entry} # chosen on the planning page{chosen}{remark}"),
     )?;
     if former.is_none() {
         edit.set(&at, "standoff_mm", &format!("{:?}", section.standoff_mm))?;

@@ -1,4 +1,4 @@
-//! The server: on this machine alone, for who knows its token.
+//! The server: on this machine alone, for requests with its token.
 
 use std::fs::{File, TryLockError};
 use std::io;
@@ -53,17 +53,17 @@ pub enum ServerError {
         /// What the system says.
         error: io::Error,
     },
-    /// Somebody else writes the session.
+    /// Another server writes the session.
     #[error("another `needlebench view` shows this folder")]
     Shown,
     /// Something else has the name of the lock.
-    #[error("session.lock in this folder is no file of its own")]
+    #[error("session.lock in this folder is not a regular file")]
     LockIsNoFile,
     /// No random numbers for a token.
-    #[error("this machine gives no random numbers: {0}")]
+    #[error("no random numbers available on this machine: {0}")]
     Random(#[from] getrandom::Error),
     /// No threads.
-    #[error("the server cannot run: {0}")]
+    #[error("the server cannot start: {0}")]
     Runtime(io::Error),
 }
 
@@ -71,9 +71,11 @@ impl ServerError {
     /// What to do about it.
     pub fn hint(&self) -> Option<&'static str> {
         match self {
-            Self::Port { .. } => Some("without --port any free one is taken"),
-            Self::Shown => Some("open the address that it printed, or end it first"),
-            Self::LockIsNoFile => Some("remove the link or folder session.lock: it is made anew"),
+            Self::Port { .. } => Some("omit --port to use any free port"),
+            Self::Shown => Some("open the address that it printed, or stop it first"),
+            Self::LockIsNoFile => {
+                Some("remove the link or folder session.lock; it is created again")
+            }
             Self::Random(_) | Self::Runtime(_) => None,
         }
     }
@@ -82,20 +84,22 @@ impl ServerError {
 /// Held while a folder is shown; the system lets go of it however the program ends.
 const LOCK_FILE: &str = "session.lock";
 
-/// Nothing where locks or files cannot be had: the session says so when it cannot be kept.
+/// None where locks or files are not available: the session reports an error when it cannot be saved.
 fn locked(folder: &Path) -> Result<Option<File>, ServerError> {
     let path = folder.join(LOCK_FILE);
-    // A link would be followed, and what it leads to is nobody's to open here.
+    // A link would be followed, and its target must not be opened here.
     if path.symlink_metadata().is_ok_and(|about| !about.is_file()) {
         return Err(ServerError::LockIsNoFile);
     }
-    let opened = File::options()
-        .read(true)
-        .write(true)
-        .create(true)
-        .truncate(false)
-        .open(path);
-    let Ok(file) = opened else {
+    let mut options = File::options();
+    options.read(true).write(true).create(true).truncate(false);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        // One that has come since is not followed either.
+        options.custom_flags(rustix::fs::OFlags::NOFOLLOW.bits().cast_signed());
+    }
+    let Ok(file) = options.open(path) else {
         return Ok(None);
     };
     match file.try_lock() {
@@ -138,7 +142,7 @@ struct App {
     results: Token,
     threads: usize,
     quick: Turns,
-    /// Of the robot while somebody drags: beside the needle's own numbers, never before them.
+    /// Of the robot during a drag: beside the needle's own numbers, never before them.
     quick_reach: Turns,
     exact: Turns,
 }
@@ -199,7 +203,7 @@ impl Server {
         Stopper(Arc::clone(&self.stopped))
     }
 
-    /// Answers until somebody stops it.
+    /// Answers until it is stopped.
     pub fn run(self) {
         let router = router(Arc::clone(&self.app));
         self.runtime.block_on(async {
@@ -253,7 +257,7 @@ async fn with_host(State(app): Shared, request: Request, next: Next) -> Response
     let answer = if answer.status() == StatusCode::METHOD_NOT_ALLOWED {
         let problem = Problem::new(
             StatusCode::METHOD_NOT_ALLOWED,
-            "this cannot be asked in this way",
+            "method not allowed for this address",
         );
         let allow = answer.headers().get(header::ALLOW).cloned();
         let mut said = problem.into_response();
@@ -275,7 +279,7 @@ async fn with_token(State(app): Shared, request: Request, next: Next) -> Respons
 }
 
 async fn nothing_here() -> Problem {
-    Problem::new(StatusCode::NOT_FOUND, "there is nothing here")
+    Problem::new(StatusCode::NOT_FOUND, "not found")
 }
 
 async fn index() -> Answer {
@@ -289,34 +293,27 @@ async fn asset(UrlPath(name): UrlPath<String>) -> Answer {
     }
 }
 
-/// A question's body as what it is to be.
+/// The body of a request, parsed.
 fn read<T: DeserializeOwned>(body: Result<Bytes, BytesRejection>) -> Result<T, Problem> {
     let body = body.map_err(|rejection| {
         if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
             Problem::new(
                 StatusCode::PAYLOAD_TOO_LARGE,
-                format!("a question has at most {} KiB", MOST_BODY / 1024),
+                format!("a request is limited to {} KiB", MOST_BODY / 1024),
             )
         } else {
-            Problem::new(
-                StatusCode::BAD_REQUEST,
-                "the question ended before it was whole",
-            )
+            Problem::new(StatusCode::BAD_REQUEST, "the request is incomplete")
         }
     })?;
-    serde_json::from_slice(&body).map_err(|error| {
-        Problem::new(
-            StatusCode::BAD_REQUEST,
-            format!("the question is not understood: {error}"),
-        )
-    })
+    serde_json::from_slice(&body)
+        .map_err(|error| Problem::new(StatusCode::BAD_REQUEST, format!("invalid request: {error}")))
 }
 
 async fn case(State(app): Shared) -> Response {
     json_response(&description(&app.case))
 }
 
-/// What the page has to know of a case at its start.
+/// What the page needs to know of a case at its start.
 fn description(case: &Case) -> Value {
     let grid = case.grid();
     let facts = case.built().facts();
@@ -459,7 +456,7 @@ async fn place(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answe
     {
         return Err(Problem::new(
             StatusCode::BAD_REQUEST,
-            "an index has three finite numbers",
+            "an index needs three finite numbers",
         ));
     }
     let place = app.case.place(&Point3::from(index));
@@ -475,14 +472,14 @@ async fn place(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answe
 #[serde(deny_unknown_fields)]
 struct Question {
     aim: Aim,
-    /// Which page asks, and the how manieth time.
+    /// Which page sends it, and the number of its requests.
     #[serde(default)]
     page: Option<String>,
     #[serde(default)]
     turn: Option<u64>,
     #[serde(default)]
     configuration: Option<String>,
-    /// Of reach: an answer at once, from few directions about the needle.
+    /// Of reach: an answer at once, from few roll angles.
     #[serde(default)]
     quick: bool,
 }
@@ -499,7 +496,7 @@ fn turn_of(kind: &str, page: Option<&String>, turn: Option<u64>) -> Option<(Stri
     Some((format!("{kind} {page}"), turn?))
 }
 
-/// That there is no such needle is an answer too.
+/// An invalid needle is an answer, too.
 fn answered<T: Serialize>(found: &Result<T, Refusal>) -> Response {
     match found {
         Ok(found) => json_response(found),
@@ -561,11 +558,10 @@ async fn planned_entries(State(app): Shared, body: Result<Bytes, BytesRejection>
     let found = app.exact.run_until(turn, work).await?;
     match found.transpose() {
         Some(found) => Ok(answered(&found)),
-        None => Err(Problem::new(
-            StatusCode::CONFLICT,
-            "a later question took the place of this one",
-        )
-        .with("overtaken", &true)),
+        None => Err(
+            Problem::new(StatusCode::CONFLICT, "superseded by a later request")
+                .with("overtaken", &true),
+        ),
     }
 }
 
@@ -603,7 +599,7 @@ async fn people_at(State(app): Shared, body: Result<Bytes, BytesRejection>) -> A
 /// A folder that cannot be read or written any more.
 fn gone(message: String) -> Problem {
     Problem::new(StatusCode::GONE, message).hint(
-        "the folder may have been moved or deleted; what is on the page is still there, and is kept once the folder is back",
+        "the folder may have been moved or deleted; the page keeps its contents and saves them once the folder is back",
     )
 }
 
@@ -631,7 +627,7 @@ async fn keep_session(State(app): Shared, body: Result<Bytes, BytesRejection>) -
             StatusCode::CONFLICT,
             "the session was changed in another tab",
         )
-        .hint("reload to have what it is there now; what is here can be brought back with undo")
+        .hint("load the other version (undo brings this one back), or keep this version")
         .with("session", &session)),
         Err(NotKept::Wrong(problem)) => {
             Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, problem))
@@ -660,18 +656,17 @@ impl From<NotWritten> for Problem {
         match why {
             NotWritten::Refused(refusal) => refusal.into(),
             NotWritten::Exists { file, free } => {
-                Self::new(StatusCode::CONFLICT, format!("there is a {file} already"))
+                Self::new(StatusCode::CONFLICT, format!("{file} exists already"))
                     .hint("overwrite it, or choose another name")
                     .with("ask", &"overwrite")
                     .with("file", &file)
                     .with("free", &free)
             }
-            NotWritten::NotAllowed(why) => Self::new(
-                StatusCode::CONFLICT,
-                format!("this needle is not allowed: {why}"),
-            )
-            .hint("the file will say that it is refused")
-            .with("ask", &"refused"),
+            NotWritten::NotAllowed(why) => {
+                Self::new(StatusCode::CONFLICT, format!("needle path rejected: {why}"))
+                    .hint("the file will be marked as rejected")
+                    .with("ask", &"refused")
+            }
         }
     }
 }

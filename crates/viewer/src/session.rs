@@ -1,13 +1,13 @@
-//! What a person decided, kept in the folder from one run of the program to the next.
+//! The user's decisions, saved in the folder from one run of the program to the next.
 //!
-//! A session has a version. Who writes says which one was read: the second of two pages that change the same version is
-//! refused, and loses nothing.
+//! A session has a version. Each write names the version that was read: the second of two pages that change the same
+//! version is rejected, and loses nothing.
 
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use needlebench_cell::{Finding, from_toml, to_toml};
+use needlebench_input::{Finding, from_toml, to_toml};
 use needlebench_report::write_atomically;
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +27,7 @@ const MOST_ROUTES: usize = 20;
 /// Farthest place, m or voxels.
 const FAR: f64 = 1e5;
 
-/// What a person decided.
+/// The user's decisions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Session {
     /// Of the layout.
@@ -69,10 +69,10 @@ pub struct NeedleChoice {
     /// The scenario's goal that it is for.
     #[serde(default)]
     pub goal: Option<String>,
-    /// Where it is to end.
+    /// Its target.
     #[serde(default)]
     pub target: Option<TargetAim>,
-    /// Where it comes from.
+    /// Its entry.
     #[serde(default)]
     pub entry: Option<EntryAim>,
     /// Label of the configuration.
@@ -84,7 +84,7 @@ pub struct NeedleChoice {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeptRoute {
-    /// What somebody calls it.
+    /// Its name.
     pub name: String,
     /// Its needle.
     pub needle: NeedleChoice,
@@ -105,7 +105,7 @@ impl NeedleChoice {
         let mut long = names.filter(|name| name.chars().count() > MOST_NAME);
         if let Some(name) = long.next() {
             return Some(format!(
-                "a name has {} characters, {MOST_NAME} are allowed",
+                "a name has {} characters, at most {MOST_NAME} allowed",
                 name.chars().count()
             ));
         }
@@ -117,7 +117,7 @@ impl NeedleChoice {
             Some(EntryAim::PlaceM(place) | EntryAim::Index(place)) => is_far(place),
             None => false,
         };
-        far.then(|| "a place has three finite numbers".to_owned())
+        far.then(|| "a position requires three finite numbers".to_owned())
     }
 }
 
@@ -127,12 +127,12 @@ impl State {
         let count = self.notes.chars().count();
         if count > MOST_NOTES {
             return Some(format!(
-                "the notes have {count} characters, {MOST_NOTES} are allowed"
+                "the notes have {count} characters, at most {MOST_NOTES} allowed"
             ));
         }
         if self.routes.len() > MOST_ROUTES {
             return Some(format!(
-                "{} routes are kept, {MOST_ROUTES} are allowed",
+                "{} paths are kept, at most {MOST_ROUTES} allowed",
                 self.routes.len()
             ));
         }
@@ -146,10 +146,10 @@ impl State {
         if let Some([low, high]) = self.window_hu
             && !(low < high && low > -40_000.0 && high < 40_000.0)
         {
-            return Some("a window is two ascending numbers of HU".to_owned());
+            return Some("a window needs two ascending HU values".to_owned());
         }
         if self.crosshair.is_some_and(|place| is_far(&place)) {
-            return Some("the crosshair has three finite numbers".to_owned());
+            return Some("the crosshair needs three finite numbers".to_owned());
         }
         let needles = self.routes.iter().map(|route| &route.needle);
         needles
@@ -158,10 +158,10 @@ impl State {
     }
 }
 
-/// Why a session was not kept.
+/// Why a session was not saved.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NotKept {
-    /// Somebody else changed it: what it is now.
+    /// It was changed elsewhere: its present state.
     Changed(Box<Session>),
     /// What is wrong with it.
     Wrong(String),
@@ -199,17 +199,18 @@ impl SessionFile {
                 });
             }
             Err(error) => {
-                return Err(Finding::new(file, format!("it cannot be read: {error}")));
+                return Err(Finding::new(file, format!("cannot be read: {error}")));
             }
         };
-        let hint = "rename it, and a new session is begun";
+        let hint = "rename it to start a new session";
         let session: Session = from_toml(&file, &text).map_err(|finding| finding.hint(hint))?;
         if session.schema_version != SCHEMA_VERSION {
-            return Err(
-                Finding::new(file, format!("it is of version {}", session.schema_version))
-                    .key("schema_version")
-                    .hint(hint),
-            );
+            return Err(Finding::new(
+                file,
+                format!("unsupported version {}", session.schema_version),
+            )
+            .key("schema_version")
+            .hint(hint));
         }
         match session.state.problem() {
             Some(problem) => Err(Finding::new(file, problem).hint(hint)),
@@ -220,7 +221,7 @@ impl SessionFile {
     /// Keeps a new state, if `version` is that of the folder's.
     ///
     /// # Errors
-    /// Somebody else was first; a state that is none; a folder that is gone.
+    /// The session was changed elsewhere; an invalid state; a missing folder.
     pub fn write(&self, version: u64, state: State) -> Result<Session, NotKept> {
         if let Some(problem) = state.problem() {
             return Err(NotKept::Wrong(problem));
@@ -237,7 +238,7 @@ impl SessionFile {
             state,
         };
         let text = to_toml(&session).map_err(NotKept::Wrong)?;
-        let head = "# What was decided on the planning page; `needlebench view` reads it.\n";
+        let head = "# Session of the planning page; read by `needlebench view`.\n";
         write_atomically(&self.path, format!("{head}{text}").as_bytes())
             .map_err(|error| NotKept::Folder(format!("the session cannot be written: {error}")))?;
         Ok(session)

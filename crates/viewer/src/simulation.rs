@@ -22,7 +22,7 @@ pub struct Progress {
     pub state: State,
     /// File of the plan.
     pub plan: Option<String>,
-    /// Goals that the plan is without: no entry was chosen there, and nothing is said of them.
+    /// Goals that the plan does not include: no entry was chosen there.
     pub left_out: Vec<String>,
     /// What it does now, or what it said last.
     pub message: String,
@@ -45,7 +45,7 @@ pub enum State {
     Finished,
     /// It ended without one.
     Failed,
-    /// Somebody stopped it.
+    /// It was cancelled.
     Cancelled,
 }
 
@@ -106,7 +106,7 @@ impl Simulation {
             .map_err(|error| {
                 Problem::new(
                     StatusCode::INTERNAL_SERVER_ERROR,
-                    format!("the simulation does not start: {error}"),
+                    format!("the simulation cannot start: {error}"),
                 )
             })?;
         let said = child.stderr.take();
@@ -143,7 +143,7 @@ impl Simulation {
             // One that has just ended cannot be killed, and need not be.
             let _ = child.kill();
             inner.progress.state = State::Cancelled;
-            "cancelled: nothing of it counts".clone_into(&mut inner.progress.message);
+            "cancelled, results discarded".clone_into(&mut inner.progress.message);
         }
         inner.progress.clone()
     }
@@ -171,7 +171,7 @@ impl Drop for Simulation {
 pub enum Engine {
     /// The one in this process: quick, and needs nothing else.
     Rapier,
-    /// Both, held against each other.
+    /// Both, compared with each other.
     Both,
 }
 
@@ -223,8 +223,8 @@ fn watch(inner: &Mutex<Inner>, said: Option<impl std::io::Read>) {
         State::Failed
     };
     inner.progress.message = match code {
-        Some(0) => "all criteria are met".to_owned(),
-        Some(1) => "a criterion is not met, or was not judged".to_owned(),
+        Some(0) => "all criteria met".to_owned(),
+        Some(1) => "a criterion failed or was not evaluated".to_owned(),
         _ => last.join("\n"),
     };
 }

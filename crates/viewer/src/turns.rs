@@ -1,4 +1,4 @@
-//! Who is answered when: few at a time, and of a drag the latest.
+//! The order of answers: few at a time, and of a drag the latest.
 
 use std::collections::HashMap;
 use std::pin::Pin;
@@ -41,8 +41,8 @@ impl Turns {
         }
     }
 
-    /// Works once there is room. Of one page's questions of a kind the latest `turn` is answered; earlier ones that still
-    /// wait are not.
+    /// Works once there is capacity. Of one page's questions of a kind the latest `turn` is answered; earlier ones
+    /// that still wait are not.
     ///
     /// # Errors
     /// Overtaken by a later turn (409); too many questions (503); a bug in the work (500).
@@ -68,29 +68,27 @@ impl Turns {
             .map(|(page, number)| self.remember(page, *number))
             .unwrap_or_default();
         let Ok(_place) = self.waiting.try_acquire() else {
-            return Err(Problem::new(
-                StatusCode::SERVICE_UNAVAILABLE,
-                "too many questions at once",
-            )
-            .hint("ask again in a moment"));
+            return Err(
+                Problem::new(StatusCode::SERVICE_UNAVAILABLE, "too many requests at once")
+                    .hint("try again in a moment"),
+            );
         };
         let permit = Arc::clone(&self.permits).acquire_owned().await;
         if turn.is_some_and(|(page, number)| self.is_overtaken(&page, number)) {
-            return Err(Problem::new(
-                StatusCode::CONFLICT,
-                "a later question took the place of this one",
-            )
-            .with("overtaken", &true));
+            return Err(
+                Problem::new(StatusCode::CONFLICT, "superseded by a later request")
+                    .with("overtaken", &true),
+            );
         }
         let done = tokio::task::spawn_blocking(move || {
-            // Given back when the work is done, whether anybody still waits for it or not.
+            // Given back when the work is done, whether its answer is still awaited or not.
             let _permit = permit;
             work(&cancel)
         });
         done.await.map_err(|_| {
             Problem::new(
                 StatusCode::INTERNAL_SERVER_ERROR,
-                "this is a bug of needlebench, not of your input",
+                "internal error: a bug of needlebench, not of your input",
             )
         })
     }

@@ -345,9 +345,10 @@ fn a_plan_is_the_scenario_with_another_goal_and_stays_in_its_folder() {
         text.contains("entry_mm = [") && text.contains("for Right-Up-Fold"),
         "{text}"
     );
-    let overrides = needlebench_cell::Overrides::default();
+    let overrides = needlebench_scenario::Overrides::default();
     let resolved =
-        needlebench_cell::load_scenario(&server.folder().join("mine.toml"), &overrides).unwrap();
+        needlebench_scenario::load_scenario(&server.folder().join("mine.toml"), &overrides)
+            .unwrap();
     let route = server.post("/api/route", &json!({"aim": aim})).json();
     let length_m = resolved.goals[0].entry_to_target_m().unwrap();
     assert!((length_m - route["length_m"].as_f64().unwrap()).abs() < 1e-6);
@@ -410,9 +411,10 @@ fn a_needle_that_is_refused_and_a_file_that_is_there_are_asked_about() {
     );
     let text = std::fs::read_to_string(server.folder().join("mine.toml")).unwrap();
     assert!(
-        text.contains(&format!("REFUSED: {}", why.as_ref().unwrap())),
+        text.contains(&format!("REJECTED: {}", why.as_ref().unwrap())),
         "{text}"
     );
+    assert!(!text.contains("not evaluated"), "{text}");
     // The same again changes nothing; another text is asked about, and has a name of its own to go to.
     assert_eq!(save(refused, "mine", json!({"refused": true})).status, 200);
     let asked = save(allowed, "mine", json!({}));
@@ -481,7 +483,7 @@ fn a_lock_that_is_a_link_is_not_followed() {
     std::os::unix::fs::symlink(&outside, folder.path().join("session.lock")).unwrap();
     let case = needlebench_viewer::Case::open(
         folder.path(),
-        &needlebench_cell::Overrides::default(),
+        &needlebench_scenario::Overrides::default(),
         &std::sync::atomic::AtomicBool::new(false),
     );
     let refused = needlebench_viewer::Server::new(case.unwrap(), 0, "needlebench".into());
@@ -534,7 +536,7 @@ fn folders_that_do_not_belong_together_are_refused() {
         change(folder.path());
         let Err(needlebench_bench::Stop::Refused(findings)) = needlebench_viewer::Case::open(
             folder.path(),
-            &needlebench_cell::Overrides::default(),
+            &needlebench_scenario::Overrides::default(),
             &std::sync::atomic::AtomicBool::new(false),
         ) else {
             panic!("it was taken: {word}");
@@ -569,7 +571,7 @@ fn folders_that_do_not_belong_together_are_refused() {
             "\"voxels_sha256\": \"",
             "\"voxels_sha256\": \"00",
         ),
-        "other Hounsfield units",
+        "different Hounsfield units",
     );
     refused(
         &replace(
@@ -601,7 +603,7 @@ fn a_folder_is_shown_once_at_a_time() {
     let folder = support::copy_of(&support::patient());
     let server = || {
         let go = std::sync::atomic::AtomicBool::new(false);
-        let overrides = needlebench_cell::Overrides::default();
+        let overrides = needlebench_scenario::Overrides::default();
         let case = needlebench_viewer::Case::open(folder.path(), &overrides, &go).unwrap();
         needlebench_viewer::Server::new(case, 0, std::path::PathBuf::from("false"))
     };

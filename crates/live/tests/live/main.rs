@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use needlebench_cell::{ClearanceClass, Overrides, ResolvedScenario, pose_of, resolve_scenario};
+use needlebench_cell::ClearanceClass;
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_live::{Limits, Live, Scene};
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::{Overrides, ResolvedScenario, pose_of, resolve_scenario};
 
 /// Rounding of some metres, through the angles of a turned base: its solids are moved, and in the program made at
 /// their place. Seen: 2.5e-11.

@@ -1,12 +1,12 @@
-// What the page asks of its server, and how it waits for answers.
+// The page's requests to its server, and how it waits for answers.
 'use strict';
 
 const PLAN = /** @type {Planning} */ ({});
 
-/** The secret of the address, which browsers send to nobody. */
+/** The secret of the address, which browsers do not send. */
 PLAN.token = location.hash.slice(1);
 
-/** An answer that is none: what is wrong, and what to do. */
+/** An error answer: what is wrong, and what to do. */
 class Problem extends Error {
   /** @param {number} status @param {ProblemBody} body */
   constructor(status, body) {
@@ -32,7 +32,7 @@ PLAN.fetch = async (path, options = {}) => {
   } catch {
     throw new Problem(0, {
       error: 'the server does not answer',
-      hint: 'start `needlebench view` again and open the address that it prints; what was kept is there again',
+      hint: 'start `needlebench view` again and open the address that it prints; the saved session is restored',
     });
   }
   if (!response.ok) {
@@ -61,9 +61,9 @@ PLAN.question = (at, text, answers) =>
     buttons.at(-1)?.focus();
   });
 
-/** Has a plan written; where that would overwrite something, or keep a needle that is refused, it asks before. */
+/** Has a plan written; asks first where that would overwrite a file or save a rejected needle path. */
 PLAN.write = async (path, plan, at) => {
-  // Who has agreed to a needle is not asked again.
+  // A needle that was agreed to is not asked about again.
   const needle = JSON.stringify(plan.aim);
   /** @type {{ name?: string, consent: { overwrite: boolean, refused: boolean } }} */
   const body = { ...plan, consent: { overwrite: false, refused: PLAN.agreed === needle } };
@@ -74,7 +74,7 @@ PLAN.write = async (path, plan, at) => {
       const { ask, file, free } = error.body || {};
       if (!ask) throw error;
       const answers =
-        ask === 'refused' ? ['Save it as refused', 'Cancel'] : [`Overwrite ${file}`, `Save as ${free}.toml`, 'Cancel'];
+        ask === 'refused' ? ['Save as rejected', 'Cancel'] : [`Overwrite ${file}`, `Save as ${free}.toml`, 'Cancel'];
       const answer = await PLAN.question(at, `${error.message}: ${error.hint}.`, answers);
       if (answer === answers.length - 1) throw new Problem(0, { error: 'nothing was written' });
       if (ask === 'refused') {

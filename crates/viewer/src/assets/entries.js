@@ -1,5 +1,5 @@
-// The entry map: the skin as the target sees it, what forbids a route, how free ones compare, and who serves the best
-// of them.
+// The entry map: the skin as seen from the target, what rejects a needle path, how admissible ones compare, and in
+// which configurations the best of them are feasible.
 'use strict';
 
 class EntryMap {
@@ -32,25 +32,24 @@ class EntryMap {
       role: 'application',
       hidden: true,
       'aria-label':
-        'Entry map: directions from the target to the skin. Arrow keys move a mark over it, Enter takes the ' +
-        'entry there.',
+        'Entry map: directions from the target to the skin. Arrow keys move a cursor, Enter selects the entry there.',
       onclick: (event) => this.clicked(event),
       onkeydown: (event) => this.key(event),
       onpointermove: (event) => this.say(this.near(this.pointed(event))),
     });
     new ResizeObserver(() => this.draw()).observe(this.canvas);
-    this.button = NB.el('button', { type: 'button', onclick: () => this.find() }, 'Find routes to the target');
+    this.button = NB.el('button', { type: 'button', onclick: () => this.find() }, 'Find needle paths');
     this.status = NB.el('p', {
       class: 'soft',
       role: 'status',
-      text: 'Judges 20\u202f000 directions by the rules of routes, and asks the robot for the best.',
+      text: 'Evaluates 20\u202f000 directions by the path rules and checks the best ones for the robot.',
     });
     this.said = NB.el('p', { class: 'entry-said', 'aria-live': 'polite' });
     this.legend = NB.el('p', { class: 'entry-legend' });
     this.table = NB.el('div');
     this.remarks = NB.el('div');
     this.latest = new Latest('entries', (answer, body) => this.answered(answer, body));
-    // On paper the needle's own row says how the rules judge it.
+    // On paper the needle's own row has the result of the path rules.
     this.element = NB.el(
       'section',
       { class: 'panel no-print' },
@@ -81,7 +80,7 @@ class EntryMap {
       this.latest.forget();
       this.of = undefined;
       this.plan = null;
-      this.show('The target is another one now.');
+      this.show('The target has changed.');
     }
     this.draw();
   }
@@ -91,7 +90,7 @@ class EntryMap {
     if (!target) return;
     this.of = EntryMap.key({ goal, target });
     this.plan = null;
-    this.show('Judging directions ...');
+    this.show('Evaluating directions ...');
     this.latest.ask({ aim: { goal, target }, robot: false });
   }
 
@@ -110,20 +109,20 @@ class EntryMap {
     this.notes = answer.remarks;
     const unknown = this.planner.facts.robot_is_unknown;
     const free =
-      `${plan.free.toLocaleString('en')} of ${plan.tried.toLocaleString('en')} directions are free by the ` +
+      `${plan.free.toLocaleString('en')} of ${plan.tried.toLocaleString('en')} directions are admissible by the ` +
       'scan\u2019s voxels';
     if (!body.robot && !unknown && plan.routes.length) {
-      this.show(`${free}; asking the robot for the best ${plan.routes.length} ...`);
+      this.show(`${free}; checking the best ${plan.routes.length} for the robot ...`);
       this.latest.ask({ aim: body.aim, robot: true });
     } else if (!plan.routes.length) this.show(`${free}.`);
-    else if (unknown) this.show(`${free}. The robot is not asked: ${unknown}.`);
+    else if (unknown) this.show(`${free}. Robot not evaluated: ${unknown}.`);
     else if (plan.chosen)
       this.show(
-        `${free}. Route ${plan.chosen.route + 1} is the best that the robot serves in ${plan.wanted} of 8 ` +
+        `${free}. Path ${plan.chosen.route + 1} is the best one that is feasible in at least ${plan.wanted} of 8 ` +
           'configurations.',
       );
-    else this.show(`${free}; none of the best is served by the robot in ${plan.wanted} of 8 configurations.`);
-    // How the needle that is shown is judged is known now.
+    else this.show(`${free}; none of the best is feasible in at least ${plan.wanted} of 8 configurations.`);
+    // The needle that is shown can be evaluated by the path rules now.
     this.planner.askRoute();
   }
 
@@ -160,8 +159,8 @@ class EntryMap {
     }
     const { rules, free } = this.planner.facts.route_colours;
     NB.clear(this.legend, [
-      PLAN.swatch(PLAN.rgb(free[0]), 'free, least odds'),
-      PLAN.swatch(PLAN.rgb(free[1]), 'twice the odds or more'),
+      PLAN.swatch(PLAN.rgb(free[0]), 'admissible, lowest odds ratio'),
+      PLAN.swatch(PLAN.rgb(free[1]), 'twice the lowest odds ratio or more'),
       ...this.plan.refused.map(({ rule, count }) =>
         PLAN.swatch(
           PLAN.rgb(rules[rule]?.[1] || [0, 0, 0]),
@@ -186,7 +185,7 @@ class EntryMap {
   }
 
   /**
-   * The free direction next to a place of the picture, or else any.
+   * The admissible direction closest to a place of the picture, or else any.
    * @param {number[]} place
    */
   near([x, y]) {
@@ -196,7 +195,7 @@ class EntryMap {
     for (let index = 0; index < this.directions.length; index++) {
       const [u, v] = this.place(this.directions[index]);
       const off = Math.hypot(u - x, v - y);
-      // A free one a few pixels away is meant.
+      // An admissible one a few pixels away is meant.
       const worth = rule[index] === null ? off - 3 : off;
       if (worth < best.worth) best = { index, worth };
     }
@@ -210,14 +209,14 @@ class EntryMap {
     const { rules } = this.planner.facts.route_colours;
     const [azimuth, elevation] = this.directions[index];
     const where =
-      `${NB.fixed(Math.abs(azimuth), 0)}\u00b0 to the ${azimuth < 0 ? 'right' : 'left'} of the front, ` +
-      `${NB.fixed(Math.abs(elevation), 0)}\u00b0 ${elevation < 0 ? 'downwards' : 'upwards'}`;
-    const depth = map.depth_m[index] === null ? '' : `, ${NB.mm(map.depth_m[index], 0)} mm deep`;
+      `${NB.fixed(Math.abs(azimuth), 0)}\u00b0 ${azimuth < 0 ? 'right' : 'left'} of anterior, ` +
+      `${NB.fixed(Math.abs(elevation), 0)}\u00b0 ${elevation < 0 ? 'caudal' : 'cranial'}`;
+    const depth = map.depth_m[index] === null ? '' : `, depth ${NB.mm(map.depth_m[index], 0)} mm`;
     const broken = map.rule[index];
     const rule = broken === null ? null : map.rules[broken];
     const how =
       rule === null
-        ? `free, odds \u00d7${NB.fixed(map.odds_ratio[index], 2)}`
+        ? `admissible, odds ratio ${NB.fixed(map.odds_ratio[index], 2)}`
         : `${rules[rule]?.[0] || rule}${this.found(rule, map.value[index], map.limit[index])}`;
     this.said.textContent = `${where}${depth}: ${how}`;
   }
@@ -226,8 +225,8 @@ class EntryMap {
   found(rule, value, limit) {
     if (value === null || !['bone', 'vessel', 'organ', 'throw', 'needle_too_short'].includes(rule)) return '';
     return rule === 'needle_too_short'
-      ? `, ${NB.mm(value)} mm, the needle reaches ${NB.mm(limit)} mm`
-      : `, ${NB.mm(value)} mm of ${NB.mm(limit)} mm wanted`;
+      ? `, ${NB.mm(value)} mm, needle reach ${NB.mm(limit)} mm`
+      : `, ${NB.mm(value)} mm, ${NB.mm(limit)} mm required`;
   }
 
   /** @param {MouseEvent} event */
@@ -254,7 +253,7 @@ class EntryMap {
   }
 
   /**
-   * Takes the entry in a direction of the map.
+   * Selects the entry in a direction of the map.
    * @param {number | null} index
    */
   take(index) {
@@ -279,7 +278,7 @@ class EntryMap {
   }
 
   /**
-   * Colour of a free direction: by how many times the least odds it has, up to twice.
+   * Colour of an admissible direction: by its odds ratio relative to the lowest one, up to twice.
    * @param {RoutePlan} plan
    * @param {number} index
    */
@@ -316,7 +315,7 @@ class EntryMap {
       map.rule[index] === null
         ? this.shade(plan, index)
         : PLAN.rgb(rules[map.rules[map.rule[index]]]?.[1] || [0, 0, 0]);
-    // Free ones last: none of them is to be hidden.
+    // Admissible ones last: none of them is to be hidden.
     for (const freeOnes of [false, true]) {
       this.directions.forEach((direction, index) => {
         if ((map.rule[index] === null) !== freeOnes) return;
@@ -409,7 +408,7 @@ class EntryMap {
   }
 
   /**
-   * Free entries near a slice, as dots: `draw(index, color)`.
+   * Admissible entries near a slice, as dots: `draw(index, color)`.
    * @param {number} axis
    * @param {number} slice
    * @param {number} within_mm
@@ -429,7 +428,7 @@ class EntryMap {
       if (Math.abs(entry.index[axis] - slice) * spacing <= within_mm) draw(entry.index, entry.color);
   }
 
-  // ---- the best routes
+  // ---- the best paths
 
   showTable() {
     this.free = null;
@@ -451,12 +450,12 @@ class EntryMap {
         part === null || distance_m === null ? [] : [{ distance_m, obstacle }],
       );
       const [least] = known.sort((a, b) => a.distance_m - b.distance_m);
-      return least ? `${NB.mm(least.distance_m)} ${NB.words(least.obstacle)}` : 'far';
+      return least ? `${NB.mm(least.distance_m)} ${NB.words(least.obstacle)}` : 'none near';
     };
     /** @type {Column<{ route: PlannedRoute, index: number }>[]} */
     const columns = [
       {
-        title: 'Route',
+        title: 'Path',
         cell: ({ route, index }) =>
           NB.el(
             'button',
@@ -465,20 +464,25 @@ class EntryMap {
               title: route.best || '',
               onclick: () => this.enter(route.direction_deg, route.depth_m, route.best),
             },
-            `Take ${index + 1}${index === chosen ? ' (chosen)' : ''}`,
+            `Use ${index + 1}${index === chosen ? ' (recommended)' : ''}`,
           ),
       },
-      { title: 'Deep', unit: 'mm', numeric: true, cell: ({ route }) => NB.mm(route.depth_m, 0) },
-      { title: 'Odds', numeric: true, cell: ({ route }) => `\u00d7${NB.fixed(route.risk.odds_ratio, 2)}` },
-      { title: 'Nearest', unit: 'mm', cell: ({ route }) => nearest(route) },
+      { title: 'Depth', unit: 'mm', numeric: true, cell: ({ route }) => NB.mm(route.depth_m, 0) },
+      { title: 'Odds ratio', numeric: true, cell: ({ route }) => NB.fixed(route.risk.odds_ratio, 2) },
+      { title: 'Nearest structure', unit: 'mm', cell: ({ route }) => nearest(route) },
     ];
     if (asked) {
       columns.push(
-        { title: 'Serve', unit: 'of 8', numeric: true, cell: ({ route }) => String(route.working) },
-        { title: 'Clear', unit: 'mm', numeric: true, cell: (row) => NB.mm(best(row)?.clearance_m) },
-        { title: 'Error', unit: 'mm', numeric: true, cell: (row) => NB.mm(best(row)?.error?.target_lateral_rms_m) },
+        { title: 'Feasible in', unit: 'of 8', numeric: true, cell: ({ route }) => String(route.working) },
+        { title: 'Clearance', unit: 'mm', numeric: true, cell: (row) => NB.mm(best(row)?.clearance_m) },
         {
-          title: 'Room',
+          title: 'Lateral error',
+          unit: 'mm',
+          numeric: true,
+          cell: (row) => NB.mm(best(row)?.error?.target_lateral_rms_m),
+        },
+        {
+          title: 'Free space',
           unit: '%',
           numeric: true,
           cell: (row) => NB.fixed(100 * (best(row)?.free_fraction ?? NaN), 0),
@@ -488,20 +492,21 @@ class EntryMap {
     const unseen = plan.margins.filter(({ known }) => !known).map(({ obstacle }) => NB.words(obstacle));
     NB.clear(
       this.table,
-      NB.table('Routes that stand for those around them, the best first', columns, shown, { class: 'small' }),
+      NB.table('Representative paths, best first', columns, shown, { class: 'small' }),
       NB.el('p', {
         class: 'soft',
         text:
-          'Odds: of a pneumothorax against a route with none of the terms; an order, no probability. Nearest: ' +
-          'lower bound of the needle\u2019s distance from bone, vessels and organs. Serve: configurations that ' +
-          'work and keep the margins with their own expected error. Clear, error across the needle (rms) and room ' +
-          'are of the best of them; postures only, motions are not planned. Room: what arm and tool leave free of ' +
-          'the half ball of 0.35 m about the entry.',
+          'Odds ratio: pneumothorax, relative to a path without risk factors; for ranking only, not a probability. ' +
+          'Nearest structure: lower bound of the needle\u2019s distance from bone, vessels and organs. Feasible in: ' +
+          'configurations that satisfy all limits and, with their own tip error, the required clearances of the ' +
+          'path. Clearance, lateral error (RMS) and free space are those of the best configuration; postures only, ' +
+          'motions not planned. Free space: share of the hemisphere of 0.35 m about the entry that arm and tool ' +
+          'leave free.',
       }),
       unseen.length
         ? NB.el('p', {
             class: 'bad',
-            text: `The label map has nothing of: ${unseen.join(', ')}. Distances from it are not known.`,
+            text: `Not labelled in this scan: ${unseen.join(', ')}. Distances from these are unknown.`,
           })
         : null,
     );

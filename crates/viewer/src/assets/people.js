@@ -1,4 +1,4 @@
-// What the chosen configuration leaves to the people in the room: space, sight, and a cone for the hand.
+// Free space, line of sight and hand cone of the chosen configuration.
 'use strict';
 
 class People {
@@ -14,7 +14,7 @@ class People {
     this.boxes = NB.el(
       'span',
       { class: 'layers', hidden: true },
-      Object.entries({ people: 'people and sight', cone: 'cone for the hand' }).map(([layer, words]) =>
+      Object.entries({ people: 'people and line of sight', cone: 'hand cone' }).map(([layer, words]) =>
         NB.checkbox(words, false, (shown) => {
           this.layers[layer] = shown;
           this.draw();
@@ -61,9 +61,9 @@ class People {
       ([name, share]) => `${NB.regionWords[name] || NB.words(name)} ${NB.percent(share)}`,
     );
     const table = NB.table(
-      'What people see of the entry and of the needle behind the guide, past arm and tool',
+      'Line of sight to the entry and to the needle behind the guide, past arm and tool',
       [
-        { title: 'Who', cell: (each) => each.person_in_words },
+        { title: 'Person', cell: (each) => each.person_in_words },
         { title: 'Entry', unit: '%', numeric: true, cell: (each) => NB.percent(each.entry_fraction) },
         { title: 'Needle', unit: '%', numeric: true, cell: (each) => NB.percent(each.needle_fraction) },
         {
@@ -71,9 +71,9 @@ class People {
           unit: '%',
           numeric: true,
           cell: (each) => NB.fixed(100 * each.accuracy, 1),
-          help: 'half-width of the 95 % interval of the mean of both',
+          help: 'half-width of the 95 % CI of the mean of both',
         },
-        { title: 'In the way', text: true, cell: (each) => (each.blocker ? NB.words(each.blocker) : '') },
+        { title: 'Blocked by', text: true, cell: (each) => (each.blocker ? NB.words(each.blocker) : '') },
       ],
       room.sight,
       { class: 'small' },
@@ -85,16 +85,16 @@ class People {
       this.text,
       NB.el('p', {
         text:
-          `Space for people: ${NB.percent(room.free_fraction)} % of the half ball of 0.35 m about the ` +
-          `entry${regions.length ? ` (${regions.join(', ')})` : ''}. Cone for the hand: ` +
-          `${NB.deg(room.hand_cone_half_angle_rad)}\u00b0 to each ` +
-          `side${room.hand_cone_blocker ? `, up to ${NB.words(room.hand_cone_blocker)}` : ''}. Elbow ` +
+          `Free space: ${NB.percent(room.free_fraction)} % of the hemisphere of 0.35 m about the ` +
+          `entry${regions.length ? ` (${regions.join(', ')})` : ''}. Hand cone: ` +
+          `half-angle ${NB.deg(room.hand_cone_half_angle_rad)}\u00b0` +
+          `${room.hand_cone_blocker ? `, limited by ${NB.words(room.hand_cone_blocker)}` : ''}. Elbow ` +
           `${room.elbow_up ? 'up' : 'down'}.`,
       }),
       NB.el('div', { class: 'no-print' }, table),
       NB.el('p', {
         class: 'print-only',
-        text: `Seen past arm and tool, % of the entry and of the needle behind the guide: ${seen.join('; ')}.`,
+        text: `Line of sight past arm and tool, % of the entry and of the needle behind the guide: ${seen.join('; ')}.`,
       }),
     );
   }

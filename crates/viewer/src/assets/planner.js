@@ -1,4 +1,4 @@
-// The planner: what is chosen, what is shown of it, and what is kept.
+// The planner: what is chosen, what is shown of it, and what is saved.
 'use strict';
 
 PLAN.WINDOWS = { lung: [-1350, 150], soft: [-160, 240], bone: [-500, 1300] };
@@ -139,7 +139,7 @@ class Planner {
         null,
         'Research software: ',
         NB.el('strong', { text: 'not a medical device.' }),
-        ' Slices as radiologists see them: the patient\u2019s right is on the left of the picture.',
+        ' Radiological convention: the patient\u2019s right is on the left of the image.',
       ),
     );
     const panes = NB.el(
@@ -203,24 +203,22 @@ class Planner {
 
   toolbar() {
     this.tools = Object.fromEntries(
-      Object.entries({ crosshair: 'Crosshair', target: 'Click the target', entry: 'Click the entry' }).map(
-        ([name, words]) => [
-          name,
-          NB.el(
-            'button',
-            {
-              type: 'button',
-              role: 'radio',
-              'aria-checked': 'false',
-              onclick: () => {
-                this.tool = name;
-                this.showTool();
-              },
+      Object.entries({ crosshair: 'Move crosshair', target: 'Set target', entry: 'Set entry' }).map(([name, words]) => [
+        name,
+        NB.el(
+          'button',
+          {
+            type: 'button',
+            role: 'radio',
+            'aria-checked': 'false',
+            onclick: () => {
+              this.tool = name;
+              this.showTool();
             },
-            words,
-          ),
-        ],
-      ),
+          },
+          words,
+        ),
+      ]),
     );
     this.windows = Object.fromEntries(
       Object.entries(PLAN.WINDOW_NAMES).map(([name, words]) => [
@@ -245,7 +243,7 @@ class Planner {
     return NB.el(
       'div',
       { class: 'bar no-print' },
-      NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'What a click does' }, Object.values(this.tools)),
+      NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Click action' }, Object.values(this.tools)),
       NB.el(
         'div',
         { class: 'tabs', role: 'radiogroup', 'aria-label': 'Window: centre and width, HU' },
@@ -275,7 +273,7 @@ class Planner {
   }
 
   /**
-   * Outlines of what each voxel was taken for; the labels come when they are first wanted.
+   * Outlines of the labels of the voxels; the labels are loaded when they are first shown.
    * @param {boolean} wanted
    */
   async showLabels(wanted) {
@@ -286,13 +284,13 @@ class Planner {
     /** @param {number} at */
     const color = (at) => palette[at % palette.length];
     if (wanted && !this.labels) {
-      this.labelLegend.textContent = 'Reading labels ...';
+      this.labelLegend.textContent = 'Loading labels ...';
       try {
         const [n, m, l] = this.facts.size;
         this.labels = new Uint16Array(
           (
             await PLAN.bytes('labels', 2 * n * m * l, (share) => {
-              this.labelLegend.textContent = `Reading labels: ${Math.round(100 * share)} %`;
+              this.labelLegend.textContent = `Loading labels: ${Math.round(100 * share)} %`;
             })
           ).buffer,
         );
@@ -371,12 +369,12 @@ class Planner {
         NB.el(
           'button',
           { type: 'button', onclick: () => this.put('target', this.state.crosshair) },
-          'Target at crosshair (T)',
+          'Set target at crosshair (T)',
         ),
         NB.el(
           'button',
           { type: 'button', onclick: () => this.put('entry', this.state.crosshair) },
-          'Entry at crosshair (E)',
+          'Set entry at crosshair (E)',
         ),
       ),
       NB.el(
@@ -390,8 +388,8 @@ class Planner {
       NB.el(
         'p',
         { class: 'soft' },
-        'mm of the scan: left, posterior, superior (LPS). The entry is where the line from the target through ' +
-          'your click leaves the skin.',
+        'Scan coordinates in mm: left, posterior, superior (LPS). The entry is the point where the line from the ' +
+          'target through the clicked point leaves the skin.',
       ),
       NB.el('div', { class: 'bar no-print' }, this.planName, this.saveButton),
       this.saved,
@@ -429,8 +427,8 @@ class Planner {
     const place = [x, y, z].map((value) => NB.fixed(value, 2)).join(', ');
     this.place = answer;
     this.readout.textContent =
-      `Crosshair: voxel ${this.state.crosshair.join(', ')}; (${place}) mm LPS, ${names.join(', ')} of the ` +
-      `scan\u2019s origin; ${NB.minus(String(answer.hu))} HU; ` +
+      `Crosshair: voxel ${this.state.crosshair.join(', ')}; (${place}) mm LPS (${names.join(', ')} of the ` +
+      `scan origin); ${NB.minus(String(answer.hu))} HU; ` +
       `${answer.label ? NB.words(answer.label) : 'outside the body'}`;
   }
 
@@ -628,8 +626,8 @@ class Planner {
       ? [lesion && NB.words(lesion.name), this.route && this.millimetres(this.route.target_m)]
           .filter(Boolean)
           .join(', ')
-      : 'not chosen';
-    this.entryText.textContent = entry ? (this.route ? this.millimetres(this.route.entry_m) : '') : 'not chosen';
+      : 'not set';
+    this.entryText.textContent = entry ? (this.route ? this.millimetres(this.route.entry_m) : '') : 'not set';
     this.saveButton.disabled = !this.route || Boolean(this.route.not_placed);
     this.simulation.allow(!this.saveButton.disabled);
     if (this.refused) {
@@ -643,29 +641,27 @@ class Planner {
     if (!this.route) {
       NB.clear(
         this.numbers,
-        NB.el('p', { text: target ? 'Click the entry, on the skin.' : 'Choose a lesion, or click the target.' }),
+        NB.el('p', { text: target ? 'Click the entry point on the skin.' : 'Choose a lesion, or click the target.' }),
       );
       return;
     }
     const { not_placed: unplaced } = this.route;
     NB.clear(
       this.numbers,
-      this.route.refusal
-        ? NB.el('p', { class: 'error', text: `This needle is refused: ${this.route.refusal}.` })
-        : null,
+      this.route.refusal ? NB.el('p', { class: 'error', text: `Needle path rejected: ${this.route.refusal}.` }) : null,
       unplaced
         ? [
             NB.el('p', { class: 'error', text: `${unplaced.message}.` }),
             unplaced.hint ? NB.el('p', { text: `Try ${unplaced.hint}.` }) : null,
           ]
         : null,
-      PLAN.routeRows([{ name: 'value', route: this.route }], 'Straight needle from the skin to the target'),
+      PLAN.routeRows([{ name: 'value', route: this.route }], 'Straight needle path from skin to target'),
       Math.abs(this.route.entry_moved_m) > 5e-3
         ? NB.el('p', {
             text:
-              `You pointed ${NB.mm(Math.abs(this.route.entry_moved_m))} mm ` +
-              `${this.route.entry_moved_m > 0 ? 'inside' : 'outside'} the skin: the entry is on the line from ` +
-              'there to the target.',
+              `The chosen point is ${NB.mm(Math.abs(this.route.entry_moved_m))} mm ` +
+              `${this.route.entry_moved_m > 0 ? 'inside' : 'outside'} the skin; the entry is on the line from ` +
+              'it to the target.',
           })
         : null,
     );
@@ -673,40 +669,34 @@ class Planner {
 
   showReach() {
     if (this.facts.robot_is_unknown) {
-      NB.clear(
-        this.configurations,
-        NB.el('p', { text: `Nothing is said of the robot: ${this.facts.robot_is_unknown}.` }),
-      );
+      NB.clear(this.configurations, NB.el('p', { text: `Robot not evaluated: ${this.facts.robot_is_unknown}.` }));
       return;
     }
     const { preview, quick, reasons = [] } = this.reach || {};
     if (!preview) {
-      NB.clear(
-        this.configurations,
-        NB.el('p', { class: 'soft', text: 'They follow once target and entry are chosen.' }),
-      );
+      NB.clear(this.configurations, NB.el('p', { class: 'soft', text: 'Choose a target and an entry first.' }));
       return;
     }
     const chosen = this.state.needle.configuration;
     const counted = quick
-      ? `At least ${preview.working} of 8 can reach it: 12 directions about the needle each; all of them follow`
-      : `${preview.working} of 8 can reach it, by their postures`;
+      ? `At least ${preview.working} of 8 feasible (12 roll angles checked, full check running)`
+      : `${preview.working} of 8 feasible (postures only)`;
     const { refusal } = this.route || {};
     const list = NB.table(
       counted,
       [
         { title: 'Configuration', cell: ({ each }) => each.label },
         {
-          title: refusal ? 'Reaches' : 'Works',
+          title: refusal ? 'Reachable' : 'Feasible',
           cell: ({ each }) =>
             NB.el('span', {
               class: each.works && !refusal ? 'good' : 'bad',
-              text: each.works ? (refusal ? 'reaches, not allowed' : 'yes') : quick ? 'not yet' : 'no',
+              text: each.works ? (refusal ? 'reachable, path rejected' : 'yes') : quick ? 'checking' : 'no',
             }),
         },
-        { title: 'Nearest', unit: 'mm', numeric: true, cell: ({ each }) => NB.mm(each.nearest?.distance_m) },
+        { title: 'Closest pair', unit: 'mm', numeric: true, cell: ({ each }) => NB.mm(each.nearest?.distance_m) },
         {
-          title: 'Of what, or why not',
+          title: 'Pair or reason',
           text: true,
           cell: ({ each, reason }) => (each.works ? (each.nearest?.pair || []).map(NB.words).join(' \u2013 ') : reason),
         },
@@ -725,7 +715,9 @@ class Planner {
     const focused = NB.tableRows(this.configurations).findIndex((row) => row.matches(':focus'));
     NB.clear(
       this.configurations,
-      refusal ? NB.el('p', { class: 'error', text: `None may be used: the needle is refused, ${refusal}.` }) : null,
+      refusal
+        ? NB.el('p', { class: 'error', text: `No configuration can be used, needle path rejected: ${refusal}.` })
+        : null,
       list,
       this.chosenText(),
     );
@@ -736,8 +728,7 @@ class Planner {
     const { motion } = this;
     const chosen = this.state.needle.configuration;
     this.playButton.disabled = !motion || motion.refused !== undefined || !motion.time_s.length;
-    if (!chosen)
-      return NB.el('p', { class: 'soft', text: 'Choose one to see its motion and the error that is to be expected.' });
+    if (!chosen) return NB.el('p', { class: 'soft', text: 'Choose a configuration to see its motion and tip error.' });
     if (!motion) return NB.el('p', { class: 'soft', text: `Planning the motion of ${chosen} ...` });
     if (motion.refused) return NB.el('p', { class: 'error', text: motion.refused.message });
     const first = motion.rejections[0];
@@ -745,22 +736,22 @@ class Planner {
       ? NB.el('p', { class: 'bad', text: `${chosen}: ${first.words}. ${first.detail}.` })
       : NB.el('p', {
           class: this.route?.refusal ? 'bad' : 'good',
-          text: `${chosen}: a motion of ${NB.fixed(motion.time_s.at(-1), 1)} s is planned and keeps all clearances${
-            this.route?.refusal ? '; the needle itself is refused' : ''
+          text: `${chosen}: motion of ${NB.fixed(motion.time_s.at(-1), 1)} s planned, all clearances satisfied${
+            this.route?.refusal ? '; needle path rejected' : ''
           }.`,
         });
     const tip = motion.tip
       ? NB.el('p', {
           text:
-            `Expected tip error at the target: ${NB.mm(motion.tip.rms_m, 2)} mm rms, ` +
-            `${NB.mm(motion.tip.lateral_rms_m, 2)} mm rms across the needle. The outline on the slices holds 95 % ` +
-            'of tips, to scale.',
+            `RMS tip error at the target: ${NB.mm(motion.tip.rms_m, 2)} mm, ` +
+            `${NB.mm(motion.tip.lateral_rms_m, 2)} mm lateral. The outline on the slices contains 95 % of tip ` +
+            'positions, to scale.',
         })
       : NB.el('p', {
           class: 'soft',
           text: motion.tip_unknown
-            ? `Expected tip error: not known, ${motion.tip_unknown}.`
-            : 'Expected tip error: not known without a motion.',
+            ? `RMS tip error unknown: ${motion.tip_unknown}.`
+            : 'RMS tip error unknown without a motion.',
         });
     return NB.el('div', null, how, tip);
   }
@@ -786,31 +777,31 @@ class Planner {
       { class: 'no-print' },
       this.playButton,
       ' ',
-      NB.el('button', { type: 'button', onclick: () => this.room.home(this.route) }, 'Show the needle'),
+      NB.el('button', { type: 'button', onclick: () => this.room.home(this.route) }, 'Show needle'),
       ' ',
       this.clock,
     );
   }
 
-  // ---- routes side by side
+  // ---- needle paths side by side
 
   routesPanel() {
     this.routeName = NB.el('input', {
       type: 'text',
       size: '16',
       maxlength: '64',
-      'aria-label': 'Name of the route',
+      'aria-label': 'Name of the path',
       value: '',
     });
     return NB.el(
       'section',
       { class: 'panel' },
-      NB.el('h2', { text: 'Routes side by side' }),
+      NB.el('h2', { text: 'Comparison of paths' }),
       NB.el(
         'div',
         { class: 'bar no-print' },
         this.routeName,
-        NB.el('button', { type: 'button', onclick: () => this.keepRoute() }, 'Keep this route'),
+        NB.el('button', { type: 'button', onclick: () => this.keepRoute() }, 'Keep path'),
       ),
       this.comparison,
     );
@@ -820,7 +811,7 @@ class Planner {
     if (!this.route) return;
     this.remember();
     const taken = new Set(this.state.routes.map(({ name }) => name));
-    let name = this.routeName.value.trim() || `route ${this.state.routes.length + 1}`;
+    let name = this.routeName.value.trim() || `path ${this.state.routes.length + 1}`;
     for (let n = 2; taken.has(name); n++) name = `${name.replace(/ \d+$/, '')} ${n}`;
     this.state.routes = [...this.state.routes, { name, needle: structuredClone(this.state.needle) }].slice(-20);
     this.routeName.value = '';
@@ -832,7 +823,7 @@ class Planner {
   async showRoutes() {
     const { routes } = this.state;
     if (!routes.length) {
-      NB.clear(this.comparison, NB.el('p', { class: 'soft', text: 'Keep a route to compare others with it.' }));
+      NB.clear(this.comparison, NB.el('p', { class: 'soft', text: 'Keep a path to compare others with it.' }));
       return;
     }
     const asked = {};
@@ -864,13 +855,13 @@ class Planner {
               this.change(structuredClone(each.needle));
             },
           },
-          `Take ${each.name}`,
+          `Use ${each.name}`,
         ),
         NB.el(
           'button',
           {
             type: 'button',
-            'aria-label': `Forget ${each.name}`,
+            'aria-label': `Delete ${each.name}`,
             onclick: () => {
               this.remember();
               this.state.routes = this.state.routes.filter((_, at) => at !== index);
@@ -883,11 +874,7 @@ class Planner {
         ),
       ),
     );
-    NB.clear(
-      this.comparison,
-      PLAN.routeRows(answers, 'Routes that were kept'),
-      NB.el('div', { class: 'tabs no-print' }, buttons),
-    );
+    NB.clear(this.comparison, PLAN.routeRows(answers, 'Kept paths'), NB.el('div', { class: 'tabs no-print' }, buttons));
   }
 
   // ---- markers, notes
@@ -899,7 +886,7 @@ class Planner {
         'section',
         { class: 'panel' },
         NB.el('h2', { text: 'Markers' }),
-        NB.el('p', { text: 'None are registered.' }),
+        NB.el('p', { text: 'No markers registered.' }),
       );
     this.markerBoxes = new Map(
       markers.map(({ name }) => [
@@ -916,27 +903,25 @@ class Planner {
     );
     for (const [name, box] of this.markerBoxes) box.control.setAttribute('aria-label', `Show ${NB.words(name)}`);
     const table = NB.table(
-      'Residuals of the registration',
+      'Registration residuals',
       [
         { title: 'Marker', cell: ({ name }) => NB.words(name) },
         { title: 'Shown', cell: ({ name }) => this.markerBoxes.get(name) },
         { title: 'Residual', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.residual_m, 2) },
-        { title: 'Expected', unit: 'mm rms', numeric: true, cell: (each) => NB.mm(each.expected_residual_m, 2) },
-        { title: 'By the others', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.by_the_others_m, 2) },
+        { title: 'Expected', unit: 'mm RMS', numeric: true, cell: (each) => NB.mm(each.expected_residual_m, 2) },
+        { title: 'Leave-one-out', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.by_the_others_m, 2) },
       ],
       markers,
       { class: 'small' },
     );
     const suspects = registration.suspects.length
-      ? NB.el('p', { class: 'bad', text: `May have moved: ${registration.suspects.map(NB.words).join(', ')}.` })
+      ? NB.el('p', { class: 'bad', text: `Possibly moved: ${registration.suspects.map(NB.words).join(', ')}.` })
       : null;
     const errors = this.facts.lesions
       .filter((lesion) => lesion.registration_rms_m !== null)
       .map((lesion) =>
         NB.el('p', {
-          text:
-            `At ${NB.words(lesion.name)} the registration is off by ${NB.mm(lesion.registration_rms_m, 2)} mm rms ` +
-            '(TRE).',
+          text: `TRE at ${NB.words(lesion.name)}: ${NB.mm(lesion.registration_rms_m, 2)} mm RMS.`,
         }),
       );
     return NB.el(
@@ -946,8 +931,8 @@ class Planner {
       table,
       NB.el('p', {
         text:
-          `They agree to ${NB.mm(registration.fre_rms_m, 2)} mm rms (FRE; ` +
-          `${NB.mm(registration.expected_fre_rms_m, 2)} expected), which does not tell the error at the target.`,
+          `FRE ${NB.mm(registration.fre_rms_m, 2)} mm RMS ` +
+          `(${NB.mm(registration.expected_fre_rms_m, 2)} expected); FRE does not predict the TRE.`,
       }),
       errors,
       suspects,
@@ -998,7 +983,7 @@ class Planner {
     );
   }
 
-  // ---- what is kept
+  // ---- what is saved
 
   /** What undo brings back. */
   remember() {
@@ -1046,7 +1031,7 @@ class Planner {
 
   keepSoon() {
     if (!this.volume) return;
-    this.kept.textContent = 'not kept yet';
+    this.kept.textContent = 'not saved yet';
     clearTimeout(this.keeping);
     this.keeping = setTimeout(() => this.keep(), 400);
   }
@@ -1064,10 +1049,10 @@ class Planner {
         body: { version: this.version, state: this.state },
       });
       this.version = version;
-      this.kept.textContent = this.again ? 'not kept yet' : 'kept';
+      this.kept.textContent = this.again ? 'not saved yet' : 'saved';
       if (this.complaint === 'keeping') this.calm();
     } catch (error) {
-      this.kept.textContent = 'not kept';
+      this.kept.textContent = 'not saved';
       const theirs = error instanceof Problem && error.status === 409 && error.body.session;
       if (theirs) this.meet(error, theirs);
       else
@@ -1109,7 +1094,7 @@ class Planner {
             this.look(this.state.crosshair);
           },
         },
-        'Reload what the other tab has',
+        'Load the other version',
       ),
       NB.el(
         'button',
@@ -1122,7 +1107,7 @@ class Planner {
             this.keep();
           },
         },
-        'Keep what is here',
+        'Keep this version',
       ),
     );
   }
@@ -1149,8 +1134,8 @@ class Planner {
     try {
       const { file, left_out: leftOut, refusal } = await PLAN.write('plan', this.plan(), this.saved);
       this.saved.textContent = refusal
-        ? `Saved as ${file}, where it says that the needle is refused: ${refusal}.`
-        : `Saved as ${file}; needlebench run takes it as it is.${PLAN.withoutGoals(leftOut)}`;
+        ? `Saved as ${file}, marked as rejected: ${refusal}.`
+        : `Saved as ${file}; ready for \`needlebench run\`.${PLAN.withoutGoals(leftOut)}`;
       this.saved.className = refusal ? 'bad' : 'good';
     } catch (error) {
       this.saved.textContent = `Not saved: ${error.message}${error.hint ? ` (${error.hint})` : ''}`;
@@ -1191,7 +1176,7 @@ PLAN.open = async () => {
         error: 'the address lacks its token',
         hint: 'open the whole address that `needlebench view` prints',
       });
-    loading.textContent = 'Reading the patient ...';
+    loading.textContent = 'Loading the patient ...';
     const [facts, session, scene] = await Promise.all([
       PLAN.ask('case'),
       PLAN.ask('session'),
@@ -1201,7 +1186,7 @@ PLAN.open = async () => {
     for (const [name, words] of Object.entries(page.words || {})) NB.dictionary.set(name, words);
     document.title = `needlebench: plan of ${facts.name}`;
     const coming = Volume.load(facts.size, facts.spacing_m, (share) => {
-      loading.textContent = `Reading the volume: ${Math.round(100 * share)} %`;
+      loading.textContent = `Loading the volume: ${Math.round(100 * share)} %`;
     });
     const volume = await coming;
     const planner = new Planner(facts, session, page, app);

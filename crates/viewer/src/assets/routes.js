@@ -1,7 +1,7 @@
-// What is known of needles, side by side.
+// Needle paths, side by side.
 'use strict';
 
-/** Routes as columns, what is known of them as rows. */
+/** Needle paths as columns, what is known of them as rows. */
 PLAN.routeRows = (columns, caption) => {
   /** @type {{ title: string, unit: string, cells: Child[] }[]} */
   const rows = [];
@@ -9,16 +9,16 @@ PLAN.routeRows = (columns, caption) => {
   const row = (title, unit, cell) =>
     rows.push({ title, unit, cells: columns.map((column) => (column.route ? cell(column.route) : '\u2013')) });
   if (columns.some(({ route }) => route?.judged)) {
-    row('By the rules of routes', '', (route) => {
+    row('Path rules', '', (route) => {
       const { judged } = route;
-      if (!judged) return 'not asked: find routes';
+      if (!judged) return 'not evaluated: find needle paths';
       const unseen = judged.unknown.length
-        ? `; not labelled, so not judged: ${judged.unknown.map(NB.words).join(', ')}`
+        ? `; not labelled, not evaluated: ${judged.unknown.map(NB.words).join(', ')}`
         : '';
       if (judged.free)
         return NB.el('span', {
           class: unseen ? 'bad' : 'good',
-          text: `free, odds \u00d7${NB.fixed(judged.odds_ratio, 2)}${unseen}`,
+          text: `admissible, odds ratio ${NB.fixed(judged.odds_ratio, 2)}${unseen}`,
         });
       /** @param {number | null} number */
       const value = (number) =>
@@ -31,25 +31,25 @@ PLAN.routeRows = (columns, caption) => {
         class: 'bad',
         text:
           `${judged.broken}: ${value(judged.value)}, ${value(judged.limit)} ` +
-          `${judged.is_least ? 'wanted' : 'allowed'}${unseen}`,
+          `${judged.is_least ? 'required' : 'allowed'}${unseen}`,
       });
     });
   }
   row('Skin to target', 'mm', (route) => NB.mm(route.length_m));
-  row('Guide\u2019s exit to tip', 'mm', (route) =>
-    route.insertion_m === null ? '\u2013' : `${NB.mm(route.insertion_m)}; the needle has ${NB.mm(route.needle_m)}`,
+  row('Guide exit to tip', 'mm', (route) =>
+    route.insertion_m === null ? '\u2013' : `${NB.mm(route.insertion_m)} (needle length ${NB.mm(route.needle_m)})`,
   );
-  row('To the skin\u2019s normal', '\u00b0', (route) => NB.deg(route.skin_angle_rad));
-  row('Out of the axial plane', '\u00b0', (route) => NB.deg(route.axial_angle_rad));
-  row('In lung', 'mm', (route) =>
+  row('Angle to skin normal', '\u00b0', (route) => NB.deg(route.skin_angle_rad));
+  row('Angle to axial plane', '\u00b0', (route) => NB.deg(route.axial_angle_rad));
+  row('Length in lung', 'mm', (route) =>
     route.in_lung_m === null
       ? 'no lung in the label map'
       : `${NB.mm(route.in_lung_m)} \u00b1 ${NB.mm(route.crossing_within_m)}`,
   );
-  row('Enters lung', 'times', (route) => (route.lung_entries === null ? '\u2013' : String(route.lung_entries)));
+  row('Lung entries', '', (route) => (route.lung_entries === null ? '\u2013' : String(route.lung_entries)));
   for (const tissue of ['bone', 'vessel', 'organ']) {
     if (!columns.some(({ route }) => route?.tissues.some((each) => each.tissue === tissue))) continue;
-    row(`To ${tissue}`, 'mm', (route) => {
+    row(`Distance to ${tissue}`, 'mm', (route) => {
       const known = route.tissues.find((each) => each.tissue === tissue);
       if (!known) return '\u2013';
       const off = known.surface_p99_m === null ? '' : ` \u00b1 ${NB.mm(known.surface_p99_m, 2)}`;
@@ -57,26 +57,26 @@ PLAN.routeRows = (columns, caption) => {
         class: known.kept ? 'good' : 'bad',
         text:
           `${NB.mm(known.distance_m)}${off} to ${known.words}, ` +
-          `${known.kept ? '' : 'refused: '}${NB.mm(known.margin_m)} wanted`,
+          `${known.kept ? '' : 'rejected: '}${NB.mm(known.margin_m)} required`,
       });
     });
   }
   if (columns.some(({ route }) => route?.fissures.length))
     row('Fissures crossed', '', (route) => route.fissures.map(NB.words).join(', ') || 'none');
-  row('Passes', 'mm from the skin', (route) =>
+  row('Structures passed', 'mm from skin', (route) =>
     route.crossings
       .map((each) => `${NB.words(each.name)} ${NB.mm(each.from_m, 0)}\u2013${NB.mm(each.to_m, 0)}`)
       .join(', '),
   );
   if (columns.some(({ reach }) => reach?.preview))
     rows.push({
-      title: 'Configurations',
+      title: 'Feasible configurations',
       unit: 'of 8',
       cells: columns.map(({ route, reach }) => {
         if (!reach?.preview) return '\u2013';
         const { working } = reach.preview;
         return route?.refusal
-          ? NB.el('span', { class: 'bad', text: `none: ${working} reach it, not allowed` })
+          ? NB.el('span', { class: 'bad', text: `none (${working} reachable, path rejected)` })
           : String(working);
       }),
     });
@@ -84,7 +84,7 @@ PLAN.routeRows = (columns, caption) => {
   const heads = [
     {
       title: 'Quantity',
-      cell: ({ title, unit }) => [title, NB.el('span', { class: 'unit', text: unit ? ` ${unit}` : '' })],
+      cell: ({ title, unit }) => [title, NB.el('span', { class: 'unit', text: unit ? ` (${unit})` : '' })],
     },
     ...columns.map(({ name }, index) => ({
       title: name,

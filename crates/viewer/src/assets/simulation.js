@@ -1,12 +1,12 @@
 // A plan that is saved, run in the background by the server, and its report.
 'use strict';
 
-/** What a plan is without. */
+/** Goals that a plan does not include. */
 PLAN.withoutGoals = (leftOut) =>
-  leftOut.length ? ` It is without ${leftOut.map(NB.words).join(', ')}: no entry was chosen there.` : '';
+  leftOut.length ? ` Not included: ${leftOut.map(NB.words).join(', ')} (no entry chosen).` : '';
 
 class Simulation {
-  // Where it is known where the robot is.
+  // Where the position of the robot is known.
   /** @type {HTMLButtonElement} */ startButton;
   /** @type {HTMLButtonElement} */ cancelButton;
   /** @type {HTMLAnchorElement} */ reportLink;
@@ -19,7 +19,7 @@ class Simulation {
     this.running = false;
     this.said = NB.el('p', { role: 'status', class: 'break' });
     if (planner.facts.robot_is_unknown) {
-      this.element = this.panel(NB.el('p', { text: 'Needs to know where the robot is.' }));
+      this.element = this.panel(NB.el('p', { text: 'Not available: the position of the robot is unknown.' }));
       return;
     }
     this.startButton = NB.el(
@@ -46,7 +46,7 @@ class Simulation {
         'Engines',
         [
           ['both', 'rapier and MuJoCo'],
-          ['rapier', 'rapier alone'],
+          ['rapier', 'rapier only'],
         ],
         this.engine,
         (value) => {

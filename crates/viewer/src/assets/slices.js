@@ -1,4 +1,4 @@
-// Slices on canvases: along the patient's axes, and along and across the needle. Pictures are in millimetres, to scale.
+// Slices on canvases: along the patient's axes, and along and perpendicular to the needle. In millimetres, to scale.
 'use strict';
 
 /**
@@ -227,7 +227,7 @@ class Slice extends Picture {
     super(
       plane.title,
       'Arrow keys move the crosshair, page up and down change the slice, plus and minus zoom, 0 shows all, T and ' +
-        'E put target and entry at the crosshair.',
+        'E set target and entry at the crosshair.',
     );
     this.plane = plane;
     this.planner = planner;
@@ -309,7 +309,7 @@ class Slice extends Picture {
   }
 
   /**
-   * What each voxel was taken for, where somebody wants to see it.
+   * Outlines of the labels, where they are switched on.
    * @param {CanvasRenderingContext2D} context
    * @param {number} slice
    * @param {number[]} extent
@@ -328,7 +328,7 @@ class Slice extends Picture {
   }
 
   /**
-   * Free entries of the map that are within 2 mm of the slice.
+   * Admissible entries of the map that are within 2 mm of the slice.
    * @param {CanvasRenderingContext2D} context
    * @param {number} slice
    */
@@ -572,14 +572,14 @@ class Slice extends Picture {
   }
 }
 
-/** Slices along the needle, interpolated between voxels: in line with it, and across it at a depth. */
+/** Slices interpolated between voxels: along the needle, and perpendicular to it at a depth. */
 class Probe extends Picture {
   /** @param {'along' | 'across'} kind @param {Planner} planner */
   constructor(kind, planner) {
     super(
-      kind === 'along' ? 'In line with the needle' : 'Across the needle',
+      kind === 'along' ? 'Along the needle' : 'Perpendicular to the needle',
       kind === 'along'
-        ? 'Left and right arrow keys turn it about the needle.'
+        ? 'Left and right arrow keys rotate it about the needle.'
         : 'Left and right arrow keys move it along the needle.',
     );
     this.kind = kind;
@@ -673,8 +673,8 @@ class Probe extends Picture {
     const degrees = Math.round((this.planner.probe.turn * 180) / Math.PI);
     this.caption.textContent =
       this.kind === 'along'
-        ? `${this.title}, turned by ${NB.minus(String(degrees))}\u00b0`
-        : `${this.title} at ${NB.fixed(this.planner.probe.depth, 1)} mm from the skin`;
+        ? `${this.title}, rotated by ${NB.minus(String(degrees))}\u00b0`
+        : `${this.title}, ${NB.fixed(this.planner.probe.depth, 1)} mm from the skin`;
   }
 
   /**

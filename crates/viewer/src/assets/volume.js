@@ -11,12 +11,12 @@ PLAN.bytes = async (path, count, progress) => {
   for (;;) {
     const { done, value } = await reader.read();
     if (done) break;
-    if (at + value.length > count) throw new Error(`the ${path} are longer than they should be`);
+    if (at + value.length > count) throw new Error(`the ${path} data are longer than expected`);
     bytes.set(value, at);
     at += value.length;
     progress(at / count);
   }
-  if (at !== count) throw new Error(`the ${path} ended before they were whole`);
+  if (at !== count) throw new Error(`the ${path} data are incomplete`);
   return bytes;
 };
 
