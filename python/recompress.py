@@ -1,4 +1,4 @@
-"""Packs a wheel again, smaller: `python recompress.py WHEEL`. The same wheel gives the same bytes."""
+"""Recompresses a wheel: `python recompress.py WHEEL`. The same wheel gives the same bytes."""
 
 import sys
 import zipfile
@@ -8,7 +8,7 @@ import zopfli.zlib
 
 
 class _Deflate:
-    """What `zipfile` asks of a compressor."""
+    """The interface of a compressor for `zipfile`."""
 
     def __init__(self) -> None:
         self._data = bytearray()

@@ -1,4 +1,4 @@
-"""Batch inverse kinematics from Python beside the same loops in Rust, in turns: time a pose.
+"""Batch inverse kinematics from Python compared with the same loops in Rust, alternating: time per pose.
 
 cargo build --release -p needlebench-kinematics --example batch_time
 python python/benches/ik.py --rust target/release/examples/batch_time
@@ -17,7 +17,7 @@ import needlebench as nb
 
 
 def best(work: Callable[[], object], repeats: int) -> float:
-    """Least time of several, s."""
+    """Shortest of several times, s."""
     times: list[float] = []
     for _ in range(repeats):
         started = time.perf_counter()
@@ -33,7 +33,7 @@ def poses() -> npt.NDArray[np.float64]:
 
 
 def python_times(few: npt.NDArray[np.float64]) -> dict[str, float]:
-    """Nanoseconds a pose."""
+    """Nanoseconds per pose."""
     many = np.tile(few, (977, 1))[:1_000_000]
     each = [pose.copy() for pose in few[:1000]]
     answers = nb.ik(few)
@@ -49,7 +49,7 @@ def python_times(few: npt.NDArray[np.float64]) -> dict[str, float]:
 
 
 def rust_times(program: str, few: npt.NDArray[np.float64]) -> dict[str, float]:
-    """The same of the Rust loops, with the same poses."""
+    """The same for the Rust loops, with the same poses."""
     with tempfile.NamedTemporaryFile() as file:
         few.tofile(file.name)
         told = subprocess.run([program, file.name], capture_output=True, text=True, check=True).stdout
@@ -64,7 +64,7 @@ def main() -> None:
     arguments = parser.parse_args()
     few = poses()
     rounds = [(rust_times(arguments.rust, few), python_times(few)) for _ in range(5)]
-    print(f"{'ns a pose, least of 5 rounds in turns':40} {'Rust':>8} {'Python':>8} {'ratio':>6}")
+    print(f"{'ns per pose, best of 5 rounds':40} {'Rust':>8} {'Python':>8} {'ratio':>6}")
     for name in rounds[0][1]:
         rust = min(rust[name] for rust, _ in rounds)
         python = min(python[name] for _, python in rounds)

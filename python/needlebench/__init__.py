@@ -1,4 +1,4 @@
-"""Testbench for needle-guide robots: which configurations work, how far off the needle is, how near anything comes.
+"""Simulation testbench for needle-guide robots: feasible configurations, needle-tip accuracy, clearances.
 
 ```python
 import needlebench as nb
@@ -9,8 +9,8 @@ print(run.verdict, run["pose"].recommended)
 ```
 
 Lengths are metres, angles radians, torques newton metres, times seconds; names end in their unit. Joint vectors are in
-the order of `JOINT_NAMES`, the eight configurations in that of `CONFIGURATIONS`. The command line answers the same
-numbers, bit for bit.
+the order of `JOINT_NAMES`, the eight configurations in that of `CONFIGURATIONS`. The command line gives the same
+results, bit for bit.
 """
 
 from . import ct

@@ -1,7 +1,7 @@
 """A study in shards on the workers of a Dask cluster.
 
-A shard is a process of its own, the same as on any other cluster, which may be killed and asked for again: it goes on
-where it was. Workers and whoever asks share a folder, and nothing else.
+A shard is a separate process, as on any other cluster, which may be killed and started again: it resumes. Workers and
+caller share a folder, and nothing else.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from ._progress import Progress
 
 PERIOD_S = 0.2
-"""How often futures and processes are looked at."""
+"""Polling period of futures and processes."""
 
 RESTARTS = 5
-"""How often a shard is asked for again where that may help."""
+"""Number of restarts of a shard, where a restart may help."""
 
 SHARDS_PER_WORKER = 4
-"""Enough that no worker waits long for the last one."""
+"""Enough for a balanced load at the end."""
 
 
 def study_on(
@@ -45,7 +45,7 @@ def study_on(
     robot: dict[str, Any],
     progress: bool | Progress | None,
 ) -> Path:
-    """Computes all shards on a client's workers; returns the folder that they are in."""
+    """Computes all shards on a client's workers; returns their folder."""
     file = Path(path).resolve()
     name = _name(file)
     folder = Path(out).resolve() / name / "shards"
@@ -70,7 +70,7 @@ def study_on(
                     elif isinstance(error, InputError) or tries[k] == RESTARTS:
                         raise _of_shard(k, count, error)
                     else:
-                        # A worker that was lost more often than Dask tolerates, or what may pass.
+                        # A worker that was lost more often than Dask tolerates, or a temporary failure.
                         tries[k] += 1
                         futures[k] = _submit(client, file, k, count, folder, stop, arguments)
                 if watch:
@@ -80,22 +80,22 @@ def study_on(
     except BaseException as error:
         _end(futures, stop)
         if isinstance(error, KeyboardInterrupt):
-            said = f"interrupted: {done} of {count} shards are in {folder}; called again it goes on"
+            said = f"interrupted: {done} of {count} shards are in {folder}; call again to resume"
             raise Interrupted(said) from error
         raise
     return folder
 
 
 def _name(file: Path) -> str:
-    """The study's name, which its folder has."""
+    """The name of the study and of its folder."""
     try:
         name = tomllib.loads(file.read_text(encoding="utf-8")).get("name")
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
         name = None
     if not isinstance(name, str):
-        # Says what is wrong with the file.
+        # Raises the error of the file.
         command("study", file, case=0)
-        raise InputError(f"{file}: has no name")
+        raise InputError(f"{file}: the study has no name")
     return name
 
 
@@ -103,10 +103,10 @@ def _number_of_shards(client: Any, shards: int | None, status: dict[str, Any]) -
     most = status["blocks"]
     if shards is None:
         threads = sum(client.nthreads().values())
-        # What was begun goes on.
+        # Shards in progress keep their number.
         return status["shards"] or max(1, min(SHARDS_PER_WORKER * threads, most))
     if not 1 <= shards <= most:
-        raise InputError(f"shards={shards}: the study can have 1 to {most}")
+        raise InputError(f"shards={shards}: 1 to {most} possible for this study")
     return shards
 
 
@@ -121,20 +121,20 @@ def _submit(
         os.fspath(folder / str(shard)),
         os.fspath(stop),
         list(arguments),
-        # Not what another call has made: its files may be gone.
+        # No cached result of another call: its files may be deleted.
         pure=False,
     )
 
 
 def _of_shard(shard: int, shards: int, error: BaseException) -> BaseException:
-    """What a shard has ended with, by its class."""
+    """The error of a shard, by its class."""
     if isinstance(error, NeedlebenchError):
         return error
     return EnvironmentFailed(f"shard {shard}/{shards}: {type(error).__name__}: {error}")
 
 
 def _end(futures: dict[int, Any], stop: Path) -> None:
-    """Stops what runs, and waits until it has kept what it has."""
+    """Stops running shards, and waits until they have stored their cases."""
     stop.touch()
     try:
         for future in futures.values():
@@ -149,39 +149,39 @@ def _end(futures: dict[int, Any], stop: Path) -> None:
 
 
 def _is_running(shard: Path) -> bool:
-    """Whether a worker says that it computes a shard."""
+    """Whether a worker computes a shard."""
     return (shard / RUNNING).exists()
 
 
 RUNNING = ".running"
-"""Is there as long as a worker watches the shard's process."""
+"""Marker file that exists while a worker watches the process of the shard."""
 
 
 def compute_shard(file: str, shard: int, shards: int, out: str, stop: str, arguments: list[str]) -> int:
-    """Computes a shard in a process that ends with this one; on a worker. Returns the exit status, 0.
+    """Computes a shard on a worker, in a process that ends with this one. Returns the exit status, 0.
 
     Raises:
         InputError: exit status 2.
         EnvironmentFailed: exit status 3, or killed.
-        Interrupted: asked to stop.
+        InterruptedShard: stopped on request.
     """
     command_line = [sys.executable, "-m", "needlebench._cluster", "study", file, f"--shard={shard}/{shards}"]
     command_line += [f"--out={out}", "--resume", "--yes", "--quiet", *arguments]
     Path(out).mkdir(parents=True, exist_ok=True)
     running = Path(out) / RUNNING
     status, said = 3, ""
-    # Between attempts, too: whoever asks it to stop waits until it has seen that.
+    # Between attempts, too: a stop request waits until it is seen.
     running.touch()
     try:
         for attempt in range(RESTARTS + 1):
             if Path(stop).exists():
-                raise InterruptedShard(f"shard {shard}/{shards}: asked to stop")
+                raise InterruptedShard(f"shard {shard}/{shards}: stopped on request")
             status, said = _watched(command_line, Path(stop))
             if status == 0:
                 return status
             if status == 2:
                 raise InputError(said)
-            # The folder of a worker that has died is in use until its process has seen that.
+            # The folder of a dead worker is in use until its process has ended.
             time.sleep(0.0 if Path(stop).exists() else min(2.0**attempt, 10.0))
     finally:
         running.unlink(missing_ok=True)
@@ -189,13 +189,13 @@ def compute_shard(file: str, shard: int, shards: int, out: str, stop: str, argum
 
 
 class InterruptedShard(NeedlebenchError):
-    """A shard that was asked to stop. It keeps what it has."""
+    """A shard that was stopped on request. Its completed cases are kept."""
 
     status = 130
 
 
 def _watched(command_line: list[str], stop: Path) -> tuple[int, str]:
-    """Exit status of a process and what it said. Its standard input is a pipe that closes when this process ends."""
+    """Exit status and error output of a process. Its standard input is a pipe that closes when this process ends."""
     with subprocess.Popen(
         command_line, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -218,7 +218,7 @@ def _watched(command_line: list[str], stop: Path) -> tuple[int, str]:
 
 
 def _main() -> int:
-    """The command line in a process that stops when its standard input ends: whoever started it is gone then."""
+    """The command line in a process that stops when its standard input ends, i.e. when its parent is gone."""
     from . import _native
 
     def watch() -> None:

@@ -19,26 +19,26 @@ if TYPE_CHECKING:
 
 
 class Answer:
-    """What a command answered."""
+    """Answer of a command."""
 
     def __init__(self, status: int, output: str, messages: str) -> None:
         self.status = status
-        """Exit status: 0, or 1 where a criterion failed or was not judged."""
+        """Exit status: 0, or 1 if a criterion failed or was not evaluated."""
         self.output = output
-        """What the command line would have printed."""
+        """Text that the command line prints to standard output."""
         self.messages = messages
-        """What it would have said beside it."""
+        """Text that it prints to standard error."""
         self._data: Any = None
 
     @property
     def data(self) -> Any:
-        """The JSON document that was printed, SI units."""
+        """The printed JSON document, SI units."""
         if self._data is None:
             self._data = json.loads(self.output)
         return self._data
 
     def check(self) -> Answer:
-        """Itself if all criteria were met; raises `CriterionFailed` otherwise."""
+        """Returns itself if all criteria are met; raises `CriterionFailed` otherwise."""
         if self.status:
             raise CriterionFailed(self.messages or self.output)
         return self
@@ -48,7 +48,7 @@ class Answer:
 
 
 def option_words(options: dict[str, Option]) -> list[str]:
-    """Keyword options as those of the command line: ``no_page=True`` is ``--no-page``, a list is repeated."""
+    """Converts keyword options to command-line options: ``no_page=True`` is ``--no-page``, a list is repeated."""
     arguments: list[str] = []
     for name, value in options.items():
         option = f"--{name.rstrip('_').replace('_', '-')}"
@@ -77,14 +77,14 @@ def command(
 ) -> Answer:
     """Runs any command of the command line in this process.
 
-    ``nb.command("suggest", "my.toml", lesion="left_upper_lobe")`` is
+    ``nb.command("suggest", "my.toml", lesion="left_upper_lobe")`` runs
     ``needlebench suggest my.toml --lesion=left_upper_lobe --json``.
 
     Args:
-        arguments: the command and what follows it.
-        json: ask for the JSON document that `Answer.data` is read from; ``False`` for commands that have none.
+        arguments: the command and its positional arguments.
+        json: request the JSON document for `Answer.data`; ``False`` for commands without JSON.
         progress: ``True`` shows a bar; a function is called with message, done and total.
-        options: options by their names with underscores; ``True`` for flags, lists for what may be repeated.
+        options: options by their names with underscores; ``True`` for flags, lists for repeatable options.
 
     Raises:
         InputError: exit status 2.
@@ -100,7 +100,7 @@ def command(
     if interrupted is not None:
         raise with_result(interrupted, answer)
     if status == InputError.status:
-        # A document may have what is wrong, and nothing stands beside it.
+        # The JSON document may contain the errors, without messages.
         raise InputError(messages.strip() or output.strip(), findings)
     if status == EnvironmentFailed.status:
         raise EnvironmentFailed(messages.strip(), answer if output else None)
@@ -108,7 +108,7 @@ def command(
 
 
 def with_result(raised: BaseException, result: Any) -> BaseException:
-    """A signal with what there is all the same; what a callback raised as it is."""
+    """A signal with completed results; exceptions of callbacks unchanged."""
     if isinstance(raised, KeyboardInterrupt):
         said = result.messages.strip() if isinstance(result, Answer) else ""
         return Interrupted(said, result)

@@ -1,4 +1,4 @@
-"""Two results side by side."""
+"""Comparison of two results."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Comparison:
-    """What changed from one result to another."""
+    """The comparison of two results."""
 
     def __init__(self, data: dict[str, Any], messages: str) -> None:
         self.data: dict[str, Any] = data
@@ -27,11 +27,11 @@ class Comparison:
 
     @property
     def failures(self) -> list[Any]:
-        """What was lost beyond what is allowed."""
+        """Regressions beyond the thresholds."""
         return self.data["failures"]
 
     def check(self) -> Comparison:
-        """Itself if no more was lost than is allowed; raises `CriterionFailed` otherwise."""
+        """Returns itself if there is no regression beyond the thresholds; raises `CriterionFailed` otherwise."""
         if self.verdict != "pass":
             lines = [_line(each) for each in [*self.failures, *self.data["incomplete"]]]
             raise CriterionFailed("\n".join([self.verdict, *lines]))
@@ -42,7 +42,7 @@ class Comparison:
 
 
 def _line(entry: Any) -> str:
-    """One thing that was lost, in words."""
+    """The text of one regression."""
     if not isinstance(entry, dict):
         return str(entry)
     known = cast("dict[str, Any]", entry)
@@ -60,13 +60,13 @@ def compare(
     """Compares two results: folders of runs or studies, reports, or scenarios, which are run.
 
     Args:
-        a: the former one.
-        b: the later one.
-        max_loss: by how much a metric may get worse, with its unit: ``{"clearance": "0.5mm"}``.
+        a: the first result.
+        b: the second result.
+        max_loss: largest permitted loss of a metric, with its unit: ``{"clearance": "0.5mm"}``.
         options: further options of ``needlebench compare``.
 
     Raises:
-        InputError: what ``needlebench compare`` refuses.
+        InputError: input that ``needlebench compare`` rejects.
     """
     losses = [f"{metric}={value}" for metric, value in (max_loss or {}).items()]
     answer = command("compare", a, b, max_loss=losses, **options)

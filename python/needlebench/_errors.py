@@ -1,4 +1,4 @@
-"""What is wrong, one class for each exit status of the command line."""
+"""Errors, with one class for each exit status of the command line."""
 
 from __future__ import annotations
 
@@ -6,40 +6,40 @@ from typing import Any, NamedTuple
 
 
 class Finding(NamedTuple):
-    """One thing that is wrong with an input."""
+    """One error in an input."""
 
     file: str
     """File, option or argument."""
     line: int | None
-    """Line, from 1, where it is known."""
+    """Line, from 1, if known."""
     key: str | None
-    """Key or element, such as ``goals[0].standoff_mm``."""
+    """Key or element, e.g. ``goals[0].standoff_mm``."""
     message: str
-    """What is wrong, with value and unit."""
+    """Description of the error, with value and unit."""
     hint: str | None
-    """How to mend it."""
+    """How to fix it."""
 
 
 class NeedlebenchError(Exception):
-    """Anything that needlebench could not do."""
+    """Base class of the errors of needlebench."""
 
     status: int = 3
-    """Exit status that the command line would end with."""
+    """Exit status of the command line."""
 
 
 class CriterionFailed(NeedlebenchError):
-    """A criterion was not met, or could not be judged. Raised on request only: ``result.check()``."""
+    """A criterion failed, or was not evaluated. Raised on request only: ``result.check()``."""
 
     status = 1
 
 
 class InputError(NeedlebenchError, ValueError):
-    """The input is wrong. The text is what the command line prints, with lines and hints."""
+    """The input is invalid. The text is that of the command line, with lines and hints."""
 
     status = 2
 
     findings: list[Finding]
-    """The same as values; empty where an option itself is wrong."""
+    """The same as values; empty if an option itself is invalid."""
 
     def __init__(self, text: str, findings: list[dict[str, Any]] | None = None) -> None:
         super().__init__(text)
@@ -47,12 +47,12 @@ class InputError(NeedlebenchError, ValueError):
 
 
 class EnvironmentFailed(NeedlebenchError, RuntimeError):
-    """The environment or an engine failed. What was finished until then is in ``result``."""
+    """The environment or an engine failed. Completed results are in ``result``."""
 
     status = 3
 
     result: Any
-    """What there is all the same, or ``None``."""
+    """Completed results, or ``None``."""
 
     def __init__(self, text: str, result: Any = None) -> None:
         super().__init__(text)
@@ -60,12 +60,12 @@ class EnvironmentFailed(NeedlebenchError, RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Interrupted. What was finished until then is in ``result``."""
+    """Interrupted. Completed results are in ``result``."""
 
     status = 130
 
     result: Any
-    """What there is all the same, or ``None``."""
+    """Completed results, or ``None``."""
 
     def __init__(self, text: str = "", result: Any = None) -> None:
         super().__init__(text)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class Poses:
     """Poses of one frame in another, one or many.
 
-    Shapes are those of one pose, with ``(n, ...)`` before them where there were n postures.
+    Shapes are for one pose, with ``(n, ...)`` in front for n postures.
     """
 
     __slots__ = ("matrix", "position_m", "quat_wxyz", "rotvec_rad")
@@ -29,7 +29,7 @@ class Poses:
     quat_wxyz: Floats
     """Unit quaternion, w first: (4,)."""
     rotvec_rad: Floats
-    """Rotation vector as UR controllers write it, rad: (3,)."""
+    """Rotation vector as shown by UR controllers, rad: (3,)."""
     matrix: Floats
     """Homogeneous matrix: (4, 4)."""
 
@@ -40,7 +40,7 @@ class Poses:
         self.matrix = arrays["matrix"]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Floats:
-        """Position and quaternion, (7,): what `ik` takes."""
+        """Position and quaternion, (7,): input of `ik`."""
         import numpy as np
 
         joined = np.concatenate([self.position_m, self.quat_wxyz], axis=-1)
@@ -52,7 +52,7 @@ class Poses:
 
 
 class ForwardKinematics:
-    """Where flange and links are."""
+    """Poses of flange and links."""
 
     __slots__ = ("flange_in_base", "flange_in_base_link", "links")
 
@@ -70,16 +70,16 @@ class ForwardKinematics:
 
 
 def fk(joints: npt.ArrayLike, arm: str | Arm = "UR3") -> ForwardKinematics:
-    """Poses of flange and links for joint positions.
+    """Computes the poses of flange and links for joint positions.
 
-    The same numbers, bit for bit, as ``needlebench fk``.
+    Bit-identical to ``needlebench fk``.
 
     Args:
         joints: joint positions, shoulder pan to wrist 3, rad: (6,) or (n, 6).
         arm: name of a UR arm (`ARMS`), or an `Arm`.
 
     Raises:
-        InputError: another shape, or numbers that are not finite.
+        InputError: wrong shape, or numbers that are not finite.
     """
     if isinstance(arm, Arm):
         return arm.fk(joints)
@@ -87,9 +87,9 @@ def fk(joints: npt.ArrayLike, arm: str | Arm = "UR3") -> ForwardKinematics:
 
 
 class Arm:
-    """An arm by itself: a UR model by its name, or a URDF, with a calibration or without.
+    """An arm: a UR model by its name, or a URDF, with or without a calibration.
 
-    ``Arm()`` is the UR3 that scenarios have by default.
+    ``Arm()`` is the UR3, the default of scenarios.
     """
 
     def __init__(
@@ -105,12 +105,12 @@ class Arm:
 
     @property
     def name(self) -> str:
-        """The maker's name where it is a known arm."""
+        """The manufacturer's name if it is a known arm."""
         return self._native.name
 
     @property
     def limits_rad(self) -> tuple[Floats, Floats]:
-        """Least and greatest joint positions, rad: (6,) each; infinite where a joint has no limit."""
+        """Lower and upper joint limits, rad: (6,) each; infinite for joints without limits."""
         return self._native.limits_rad
 
     def fk(self, joints: npt.ArrayLike) -> ForwardKinematics:
@@ -122,33 +122,33 @@ class Arm:
 
 
 class Solution(NamedTuple):
-    """One posture for a pose."""
+    """One solution of the inverse kinematics."""
 
     label: str
-    """Which of `CONFIGURATIONS` it is."""
+    """Its configuration, one of `CONFIGURATIONS`."""
     joints_rad: Floats
     """Joint positions, rad: (6,)."""
     residual_m: float
-    """Distance of the flange from the wanted position, m."""
+    """Distance of the flange from the target position, m."""
     residual_rad: float
-    """Angle of the flange from the wanted orientation, rad."""
+    """Angle of the flange from the target orientation, rad."""
     within_limits: bool
     """Within the joint limits."""
     free_joint: str | None
-    """``wrist_3`` where that may take other values."""
+    """``wrist_3`` if it may take any value, else ``None``."""
     kind: str
     """``exact``, ``touching`` or ``nearest``."""
 
 
 class Solutions(NamedTuple):
-    """All postures for a pose, as ``needlebench ik --json`` answers."""
+    """All solutions for a pose, as in ``needlebench ik --json``."""
 
     solutions: list[Solution]
-    """Postures that reproduce the pose."""
+    """The solutions."""
     nearest: list[Solution]
-    """Least-squares postures for a pose that none reaches; never solutions."""
+    """Least-squares postures for an unreachable pose; never solutions."""
     certificate: str
-    """What the answer is worth: one of `CERTIFICATES`, or what a numerical method says."""
+    """Certificate of completeness: one of `CERTIFICATES`, or that of a numerical method."""
     data: dict[str, Any]
     """The whole answer."""
 
@@ -165,24 +165,24 @@ def solve(
     tolerance: float | None = 1e-7,
     **options: Any,
 ) -> Solutions:
-    """All postures of one pose, checked by forward kinematics: calibrated arms, goals of scenarios, numerical methods.
+    """Solves one pose, verified by forward kinematics; for calibrated arms, scenario goals and numerical methods.
 
-    For many poses of a nominal arm `ik` is a thousand times as fast.
+    For many poses of a nominal arm `ik` is a thousand times faster.
 
     Args:
-        pose: the flange in the controller's base frame, x, y, z (m) and rotation vector (rad); or leave it out and give
-            ``scenario`` and ``goal``.
-        scenario: file of a scenario.
+        pose: flange in the controller's base frame, x, y, z (m) and rotation vector (rad); omit it with ``scenario``
+            and ``goal``.
+        scenario: scenario file.
         goal: one of its goals.
-        arm: name of a UR arm; the UR3 of scenarios if left out.
+        arm: name of a UR arm [default: UR3].
         robot: URDF of another arm.
-        calibration: the maker's calibration of an arm (YAML).
-        seed: joint positions to be near to, rad: (6,).
-        tolerance: by how much a posture may miss the pose and still be one that touches, m and rad.
+        calibration: factory calibration of the arm (YAML).
+        seed: reference or initial joint positions, rad: (6,).
+        tolerance: pose tolerance for boundary solutions, m and rad.
         options: further options of ``needlebench ik``.
 
     Raises:
-        InputError: what ``needlebench ik`` refuses.
+        InputError: input that ``needlebench ik`` rejects.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""Private: arrays, and functions of the program itself."""
+"""Private: arrays, and functions of the compiled module."""
 
 import os
 from collections.abc import Callable
@@ -28,42 +28,42 @@ VERSION: Final[str]
 CONFIGURATIONS: Final[tuple[str, ...]]
 """Labels of the eight configurations, in the order of arrays."""
 CERTIFICATES: Final[tuple[str, ...]]
-"""What answers of inverse kinematics are worth, by number."""
+"""Certificates of inverse-kinematics answers, by number."""
 JOINT_NAMES: Final[tuple[str, ...]]
-"""ROS's names of the joints, in the order of joint vectors."""
+"""ROS names of the joints, in the order of joint vectors."""
 ARMS: Final[tuple[str, ...]]
 """Names of the UR arms."""
 CLEARANCE_CLASSES: Final[tuple[str, ...]]
-"""Classes of pairs between which clearances are measured."""
+"""Clearance classes of collision pairs."""
 
 _Progress = Callable[[str, int, int], object]
 _Path = str | os.PathLike[str]
 
 @final
 class IkAnswers:
-    """All eight configurations of poses, in the memory that they were computed in.
+    """The solutions of poses in all eight configurations, without copies.
 
-    Shapes are those of one pose, with ``(n, ...)`` before them where an array of poses was given.
+    Shapes are for one pose, with ``(n, ...)`` in front for an array of poses.
     """
 
     @property
     def joints(self) -> npt.NDArray[np.float64]:
-        """Joint positions, rad: (8, 6), by configuration; NaN where there is none. A view; strides 8, 64."""
+        """Joint positions, rad: (8, 6), by configuration; NaN without a solution. A view; strides 8, 64."""
     @property
     def exists(self) -> npt.NDArray[np.bool_]:
-        """Which configurations there are: (8,)."""
+        """Which configurations have a solution: (8,)."""
     @property
     def merged(self) -> npt.NDArray[np.bool_]:
-        """Which stand for another one too, that is the same posture: (8,)."""
+        """Which are coincident solutions, i.e. stand for another configuration too: (8,)."""
     @property
     def wrist_3_is_free(self) -> npt.NDArray[np.bool_]:
-        """Which stand for a family, in which wrist 3 may take other values: (8,)."""
+        """Which stand for a family of solutions with free wrist 3: (8,)."""
     @property
     def touching(self) -> npt.NDArray[np.bool_]:
-        """Which miss the pose by no more than the tolerance: (8,)."""
+        """Which are boundary solutions, off the pose by no more than the tolerance: (8,)."""
     @property
     def certificate(self) -> Any:
-        """What the answer is worth, as a place in `CERTIFICATES`. A view where there are n poses."""
+        """Certificate of completeness, as an index into `CERTIFICATES`. A view for n poses."""
     def __len__(self) -> int: ...
 
 def ik(
@@ -74,20 +74,20 @@ def ik(
     tolerance: float = 1e-7,
     out: IkAnswers | None = None,
 ) -> IkAnswers:
-    """All eight configurations of poses of the flange in the controller's base frame, for a nominal UR arm.
+    """Solves flange poses in the controller's base frame in all eight configurations, for a nominal UR arm.
 
-    The same postures, bit for bit, as ``needlebench ik --arm``; the interpreter's lock is not held meanwhile.
+    Bit-identical to ``needlebench ik --arm``; the global interpreter lock is released.
 
     Args:
         poses: position (m) and unit quaternion w, x, y, z: (7,) or (n, 7); position and rotation vector (rad): (6,) or
             (n, 6); homogeneous matrices: (4, 4) or (n, 4, 4); or `Poses`.
         arm: name of a UR arm (`ARMS`).
-        seed: joint positions to be near to where wrist 3 is free, rad: (6,).
-        tolerance: by how much a posture may miss the pose and still be one that touches, m and rad.
-        out: answers of an earlier call of the same shape, whose memory is written over.
+        seed: reference joint positions for a free wrist 3, rad: (6,).
+        tolerance: pose tolerance for boundary solutions, m and rad.
+        out: answers of an earlier call of the same shape, to be overwritten.
 
     Raises:
-        InputError: another shape, no rotation, or a position beyond 10 m.
+        InputError: wrong shape, invalid rotation, or a position beyond 10 m.
     """
 
 def fk(joints: npt.ArrayLike, arm: str = "UR3") -> dict[str, Any]: ...
@@ -150,7 +150,7 @@ class Scenario:
         *,
         engines: list[str] | None = None,
         jobs: int | None = None,
-        referee: bool = False,
+        reference: bool = False,
         out: _Path | None = None,
         pictures: bool = True,
         page: bool = True,

@@ -1,4 +1,4 @@
-"""Progress for people who watch."""
+"""Progress of long work."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable
 
 Progress = Callable[[str, int, int], object]
-"""Is called with what is being done, how many steps are done, and how many there are (0: unknown)."""
+"""Is called with the current activity, the number of completed steps and the total (0: unknown)."""
 
 
 class Bar:
-    """A line on standard error that is written over, in a terminal as in a notebook; lines of a log elsewhere."""
+    """A line on standard error that is overwritten, in a terminal or notebook; log lines elsewhere."""
 
     def __init__(self) -> None:
         self._started = self._last = time.monotonic()
@@ -21,10 +21,10 @@ class Bar:
         self._is_live = stream.isatty() or type(stream).__module__.startswith("ipykernel")
 
     def __call__(self, message: str, done: int, total: int) -> None:
-        """Shows how far the work is."""
+        """Shows the progress."""
         now = time.monotonic()
         elapsed = now - self._started
-        # As the command line: no line for what is short, and rarer ones the longer it takes.
+        # As the command line: no line for short work, and fewer lines the longer it takes.
         least = 0.1 if self._is_live else max(1.0, 0.05 * elapsed)
         if now - self._last < least:
             return
@@ -40,7 +40,7 @@ class Bar:
         sys.stderr.flush()
 
     def close(self) -> None:
-        """Wipes the line."""
+        """Clears the line."""
         if self._is_live and self._length:
             sys.stderr.write("\r" + " " * self._length + "\r")
             sys.stderr.flush()
@@ -48,7 +48,7 @@ class Bar:
 
 
 class Watching:
-    """Watches some work: silently, with a bar, or with a function of the caller's."""
+    """Reports progress: not at all, with a bar, or to a function of the caller."""
 
     def __init__(self, progress: bool | Progress | None) -> None:
         self._bar = Bar() if progress is True else None
@@ -59,10 +59,10 @@ class Watching:
             self._progress = self._bar
 
     def __enter__(self) -> Progress | None:
-        """What is told how far the work is."""
+        """The function that receives the progress."""
         return self._progress
 
     def __exit__(self, *_: object) -> None:
-        """Wipes the bar."""
+        """Clears the bar."""
         if self._bar:
             self._bar.close()

@@ -1,4 +1,4 @@
-"""What plans and runs leave."""
+"""Results of plans and runs."""
 
 from __future__ import annotations
 
@@ -21,32 +21,32 @@ Recording = dict[str, Any]
 
 
 class PlannedConfiguration:
-    """One of the eight configurations of a goal, as it was planned."""
+    """One of the eight configurations of a goal, as planned."""
 
     def __init__(self, native: _native.Run, goal: str, report: dict[str, Any]) -> None:
         self._native = native
         self._goal = goal
         self.report: dict[str, Any] = report
-        """What the report says of it, SI units."""
+        """Its part of the report, SI units."""
 
     @property
     def label(self) -> str:
-        """Which of `needlebench.CONFIGURATIONS` it is."""
+        """Its label, one of `needlebench.CONFIGURATIONS`."""
         return self.report["label"]
 
     @property
     def status(self) -> str:
-        """``planned``: it breaks no rule and has a motion; ``rejected`` otherwise."""
+        """``planned``: no rule rejects it and it has a motion; ``rejected`` otherwise."""
         return "rejected" if self.rejections else "planned"
 
     @property
     def rejections(self) -> list[dict[str, Any]]:
-        """Rules that it breaks, the first failing one first."""
+        """Rules that reject it, the first failing one first."""
         return self.report["rejections"]
 
     @property
     def joints_rad(self) -> Floats | None:
-        """Its final posture, rad: (6,); ``None`` where the pose is out of reach."""
+        """Its final posture, rad: (6,); ``None`` if the pose is out of reach."""
         import numpy as np
 
         joints = self.report["joints_rad"]
@@ -59,19 +59,19 @@ class PlannedConfiguration:
 
     @property
     def clearance(self) -> dict[str, Any]:
-        """Least clearances by class over its motion, attained and proven, m."""
+        """Minimum clearances by class over its motion, attained and certified, m."""
         return self.report["clearance"]
 
     def duration_s(self, *, retreat: bool = False) -> float | None:
-        """Length of its planned motion, or of the way back, s; ``None`` where there is none."""
+        """Duration of its planned motion, or of the retreat, s; ``None`` without a motion."""
         return self._native.duration_s(self._goal, self.label, retreat=retreat)
 
     def motion(self, times_s: npt.ArrayLike | None = None, *, retreat: bool = False) -> dict[str, Any]:
         """Its planned motion: position, velocity and acceleration of all joints.
 
         Args:
-            times_s: times, s: (n,); every 8 ms of the whole motion if left out.
-            retreat: the way back.
+            times_s: times, s: (n,) [default: every 8 ms of the whole motion].
+            retreat: the retreat instead of the motion to the goal.
 
         Returns:
             ``time_s`` (n,), ``phase``, and ``position_rad``, ``velocity_rad_s``, ``acceleration_rad_s2`` (n, 6).
@@ -93,7 +93,7 @@ class PlannedConfiguration:
 
 
 class Configuration(PlannedConfiguration):
-    """One of the eight configurations of a goal, as it was simulated and judged."""
+    """One of the eight configurations of a goal, as simulated and evaluated."""
 
     @property
     def status(self) -> str:
@@ -102,13 +102,13 @@ class Configuration(PlannedConfiguration):
 
     @property
     def recordings(self) -> dict[str, Recording]:
-        """What each engine recorded, by its name."""
+        """The recording of each engine, by its name."""
         engines = self._native.engines(self._goal, self.label)
         return {engine: self._native.recording(self._goal, self.label, engine) for engine in engines}
 
     @property
     def recording(self) -> Recording:
-        """What the first engine recorded.
+        """The recording of the first engine.
 
         ``time_s`` (n,), ``phase``; ``position_rad``, ``velocity_rad_s`` and the planned ``reference_...`` (n, 6);
         ``torque_nm``, ``drive_nm`` over each step (n - 1, 6); ``flange_in_world``: ``position_m``, ``quat_wxyz``, ...;
@@ -129,7 +129,7 @@ _Configuration = TypeVar("_Configuration", bound=PlannedConfiguration)
 class _Goal(Mapping[str, _Configuration], Generic[_Configuration]):
     def __init__(self, report: dict[str, Any], configurations: list[_Configuration]) -> None:
         self.report: dict[str, Any] = report
-        """What the report says of it, SI units."""
+        """Its part of the report, SI units."""
         self._configurations = {each.label: each for each in configurations}
 
     @property
@@ -156,21 +156,21 @@ class PlannedGoal(_Goal[PlannedConfiguration]):
 
     @property
     def planned(self) -> list[PlannedConfiguration]:
-        """Configurations that break no rule and have a motion. Criteria are not judged: that is what a run does."""
+        """Configurations with a motion that no rule rejects. Criteria are evaluated by a run only."""
         return [each for each in self.values() if each.status == "planned"]
 
 
 class GoalResult(_Goal[Configuration]):
-    """What became of one goal: its configurations by their labels."""
+    """Results of one goal: its configurations by their labels."""
 
     @property
     def working(self) -> list[Configuration]:
-        """Configurations that work."""
+        """Feasible configurations."""
         return [each for each in self.values() if each.status == "ok"]
 
     @property
     def recommended(self) -> Configuration | None:
-        """The one to choose; ``None`` if none works."""
+        """The recommended configuration; ``None`` if none is feasible."""
         chosen = self.report["recommended"]
         return None if chosen is None else self[chosen["label"]]
 
@@ -187,11 +187,11 @@ _JUDGED = (
     "ranking",
     "files",
 )
-"""What a plan knows nothing of."""
+"""Keys that a plan does not have."""
 
 
 class Plan(Mapping[str, PlannedGoal]):
-    """Goals by their names, with the plans of their configurations: nothing simulated, nothing judged."""
+    """Goals by their names, with the plans of their configurations; not simulated, not evaluated."""
 
     def __init__(self, native: _native.Run) -> None:
         def planned(goal: dict[str, Any]) -> PlannedGoal:
@@ -218,7 +218,7 @@ class Plan(Mapping[str, PlannedGoal]):
 
 
 class Run(Mapping[str, GoalResult]):
-    """What a run left: goals by their names, the report, recordings, the verdict."""
+    """Results of a run: goals by their names, the report, recordings, the verdict."""
 
     def __init__(self, native: _native.Run) -> None:
         self._native = native
@@ -256,15 +256,15 @@ class Run(Mapping[str, GoalResult]):
 
     @property
     def criteria(self) -> list[dict[str, Any]]:
-        """What was judged."""
+        """The evaluated criteria."""
         return self.report["criteria"]
 
     def check(self) -> Run:
-        """Itself if all criteria were met; raises `CriterionFailed` with those that were not."""
+        """Returns itself if all criteria are met; raises `CriterionFailed` with the failed ones otherwise."""
         if self.verdict != "pass":
             missed = [each for each in self.criteria if not each["pass"]]
             lines = [" ".join(str(part) for part in _line(each) if part) for each in missed]
-            lines += [f"not judged: {each}" for each in self.report["not_judged"]]
+            lines += [f"not evaluated: {each}" for each in self.report["not_judged"]]
             raise CriterionFailed("\n".join([f"{self.verdict}: {self.report['scenario']}", *lines]))
         return self
 
@@ -273,7 +273,7 @@ class Run(Mapping[str, GoalResult]):
 
 
 def _line(criterion: dict[str, Any]) -> list[Any]:
-    """A criterion that was missed, in words."""
+    """The text of a failed criterion."""
     place = [criterion[key] for key in ("goal", "label", "engine")]
     value, limit, unit = (criterion[key] for key in ("value", "limit", "unit"))
     return [*place, f"{criterion['criterion']}: {value} {unit}, limit {limit} {unit}", criterion["detail"]]

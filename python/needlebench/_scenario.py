@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import _native
@@ -23,23 +24,23 @@ if TYPE_CHECKING:
 
 
 class ClassClearance(NamedTuple):
-    """The least clearance of one class of pairs.
+    """The minimum clearance of one class of pairs.
 
-    Shapes are those of one posture, with ``(n, ...)`` before them where there were n.
+    Shapes are for one posture, with ``(n, ...)`` in front for n postures.
     """
 
     minimum_m: Any
-    """Signed distance, m: a gap is positive, a depth negative."""
+    """Signed distance, m: positive for a gap, negative for a penetration."""
     pair: Any
-    """Names of the two solids; a list of them where there are n postures."""
+    """Names of the two solids; a list of them for n postures."""
     witness_points_m: Floats
-    """A point on each of the two, in the world, m: (2, 3)."""
+    """Witness points, one on each solid, in the world frame, m: (2, 3)."""
 
 
 class PairClearances(NamedTuple):
-    """Signed distances of all pairs that are measured.
+    """Signed distances of all enabled pairs.
 
-    Shapes are those of one posture, with ``(n, ...)`` before them where there were n.
+    Shapes are for one posture, with ``(n, ...)`` in front for n postures.
     """
 
     pair: list[tuple[str, str]]
@@ -49,48 +50,48 @@ class PairClearances(NamedTuple):
     distance_m: Floats
     """Signed distance of each pair, m: (p,)."""
     witness_points_m: Floats
-    """A point on each body, in the world, m: (p, 2, 3)."""
+    """Witness points, one on each body, in the world frame, m: (p, 2, 3)."""
     solids: Any
-    """Names of the two solids that are nearest; a list of such lists where there are n postures."""
+    """Names of the two closest solids; a list of such lists for n postures."""
 
 
 class Clearance(NamedTuple):
     """Clearances of one posture or several."""
 
     classes: dict[str, ClassClearance]
-    """By class; a class that the cell has no pair of is absent."""
+    """By class; classes without pairs in the cell are absent."""
     pairs: PairClearances | None
-    """All pairs, where they were asked for."""
+    """All pairs, if requested."""
 
 
 class ClassCertificate(NamedTuple):
-    """The least clearance of one class over a whole motion, from both sides."""
+    """Bounds of the minimum clearance of one class over a whole motion."""
 
     certified_lower_bound_m: float
-    """Proven for every time of the motion, m."""
+    """Certified lower bound over the whole motion, m."""
     minimum_m: float
-    """Attained, m."""
+    """Attained minimum, m."""
     time_s: float
-    """When it is attained, s."""
+    """Time of the minimum, s."""
     joints_rad: Floats
-    """Posture in which it is attained, rad: (6,)."""
+    """Posture of the minimum, rad: (6,)."""
     pair: tuple[str, str]
     """Names of the two solids."""
     witness_points_m: Floats
-    """A point on each, in the world, m: (2, 3)."""
+    """Witness points, one on each solid, in the world frame, m: (2, 3)."""
 
 
 class Certificate(NamedTuple):
-    """Proven clearances of a motion."""
+    """Certified clearances of a motion."""
 
     classes: dict[str, ClassCertificate]
     """By class."""
     duration_s: float
-    """How long the motion takes, s."""
+    """Duration of the motion, s."""
 
 
 class Scenario:
-    """A scenario that was read and checked: robot, tool, patient, room, goals."""
+    """A validated scenario: robot, tool, patient, room, goals."""
 
     def __init__(self, native: _native.Scenario, options: dict[str, Any]) -> None:
         self._native = native
@@ -112,15 +113,16 @@ class Scenario:
 
         Args:
             path: TOML file.
-            robot: URDF in place of the scenario's robot.
-            arm: whose data the robot has, where the URDF does not say.
-            prefix: what stands before the names of the robot's joints, where a URDF has several arms.
-            calibration: the maker's calibration of the arm (YAML).
+            robot: URDF instead of the scenario's robot.
+            arm: arm data: a bundled arm (e.g. ``ur5e``) or the path of an arm.toml; also selects the robot without
+                ``robot``.
+            prefix: prefix of the arm's link and joint names, for a URDF with several arms.
+            calibration: factory calibration of the arm (YAML).
             packages: ``NAME=DIR`` for ``package://NAME/`` in URDFs.
-            missing_inertia: what to do where the URDF has no inertia.
+            missing_inertia: policy for links without inertia in the URDF.
 
         Raises:
-            InputError: with every finding of ``needlebench check``, and a start posture that collides.
+            InputError: with all findings of ``needlebench check``, and for a start posture in collision.
         """
         native = _native.Scenario.load(
             path,
@@ -150,7 +152,7 @@ class Scenario:
 
     @property
     def description(self) -> str:
-        """What it is about."""
+        """Its description."""
         return self._native.description
 
     @property
@@ -165,7 +167,7 @@ class Scenario:
 
     @property
     def arm(self) -> str:
-        """The maker's name of its arm."""
+        """The manufacturer's name of its arm."""
         return self._native.arm
 
     @property
@@ -175,12 +177,12 @@ class Scenario:
 
     @property
     def notes(self) -> list[str]:
-        """What was assumed or adjusted."""
+        """Notes on assumed and adjusted values."""
         return self._native.notes
 
     @property
     def start_rad(self) -> Floats:
-        """Posture in which every motion begins, rad: (6,)."""
+        """Start posture of all motions, rad: (6,)."""
         return self._native.start_rad
 
     def __repr__(self) -> str:
@@ -191,16 +193,16 @@ class Scenario:
         return ForwardKinematics(self._native.fk(joints))
 
     def clearance(self, joints: npt.ArrayLike, *, pairs: bool = False) -> Clearance:
-        """Signed clearances of postures in its cell.
+        """Computes the signed clearances of postures in its cell.
 
-        The same numbers, bit for bit, as ``needlebench clearance``.
+        Bit-identical to ``needlebench clearance``.
 
         Args:
             joints: joint positions, rad: (6,) or (n, 6).
-            pairs: list every pair that is measured, too.
+            pairs: also return every enabled pair.
 
         Raises:
-            InputError: another shape, or numbers that are not finite.
+            InputError: wrong shape, or numbers that are not finite.
         """
         found = self._native.clearance(joints, pairs=pairs)
         classes = {name: ClassClearance(**each) for name, each in found["classes"].items()}
@@ -211,26 +213,26 @@ class Scenario:
         return Clearance(classes, PairClearances(**all_pairs))
 
     def certify(self, joints: npt.ArrayLike, *, tolerance_m: float = 1e-4) -> Certificate:
-        """Proves how near anything comes while the arm goes straight in joint space through postures.
+        """Certifies the clearances of joint-space lines through postures.
 
-        Speeds are the scenario's; bounds do not depend on them.
+        Speeds are those of the scenario; the bounds do not depend on them.
 
         Args:
             joints: postures, rad: (n, 6), n at least 2.
-            tolerance_m: how far the proven bound may be below what is attained, m.
+            tolerance_m: largest gap between certified bound and attained minimum, m.
 
         Raises:
-            InputError: another shape, or numbers that are not finite.
+            InputError: wrong shape, or numbers that are not finite.
         """
         found = self._native.certify(joints, tolerance_m=tolerance_m)
         classes = {name: ClassCertificate(**each) for name, each in found["classes"].items()}
         return Certificate(classes, found["duration_s"])
 
     def plan(self, *, jobs: int | None = None, progress: bool | Progress | None = None) -> Plan:
-        """Plans every configuration of every goal, without simulating: postures, reasons, motions, proven clearances.
+        """Plans every configuration of every goal without simulation: postures, rejections, motions, clearances.
 
         Args:
-            jobs: threads; as many as there are cores if left out. Results do not depend on it.
+            jobs: number of threads [default: all cores]; does not affect results.
             progress: ``True`` shows a bar; a function is called with message, done and total.
         """
         with Watching(progress) as watch:
@@ -245,37 +247,42 @@ class Scenario:
         engines: list[str] | None = None,
         *,
         jobs: int | None = None,
-        referee: bool = False,
+        reference: bool = False,
+        referee: bool | None = None,
         out: str | os.PathLike[str] | None = None,
         pictures: bool = True,
         page: bool = True,
         record: str | None = None,
         progress: bool | Progress | None = None,
     ) -> Run:
-        """Plans, simulates, measures and judges every configuration of every goal.
+        """Plans, simulates, measures and evaluates every configuration of every goal.
 
-        The report has the same numbers as ``needlebench run --json``, bit for bit, but for ``timings``.
+        The report is bit-identical to ``needlebench run --json``, except ``timings``.
 
         Args:
-            engines: names of engines; the scenario's own choice if left out.
-            jobs: threads; as many as there are cores if left out. Results do not depend on it.
-            referee: hold every motion against the referee.
-            out: folder; the results are written into ``out/NAME`` as ``needlebench run --out`` does.
-            pictures: pictures and charts among them.
-            page: the report page among them.
-            record: ``"mcap"`` writes each recording as MCAP with ROS 2 messages, too.
+            engines: names of physics engines [default: those of the scenario].
+            jobs: number of threads [default: all cores]; does not affect results.
+            reference: verify every motion against the reference integrator.
+            referee: the old name of ``reference``.
+            out: folder; results are written to ``out/NAME``, as by ``needlebench run --out``.
+            pictures: with images and charts.
+            page: with the report page.
+            record: ``"mcap"`` also writes each recording as MCAP with ROS 2 messages.
             progress: ``True`` shows a bar; a function is called with message, done and total.
 
         Raises:
-            InputError: an engine that there is not; a scan that cannot be used.
-            EnvironmentFailed: an engine failed; what the others measured is in ``result``.
-            Interrupted: what was finished until then is in ``result``.
+            InputError: unknown engine, or unusable scan.
+            EnvironmentFailed: an engine failed; the measurements of the others are in ``result``.
+            Interrupted: completed results are in ``result``.
         """
+        if referee is not None:
+            warnings.warn("`referee` is now `reference`", DeprecationWarning, stacklevel=2)
+            reference = reference or referee
         with Watching(progress) as watch:
             native, interrupted = self._native.run(
                 engines=engines,
                 jobs=jobs,
-                referee=referee,
+                reference=reference,
                 out=out,
                 pictures=pictures,
                 page=page,
@@ -301,22 +308,22 @@ class Scenario:
         joints: npt.ArrayLike | None = None,
         progress: bool | Progress | None = None,
     ) -> list[dict[str, Any]]:
-        """Writes the cell or a motion in the format of another tool, as ``needlebench export`` does.
+        """Exports the cell or a motion to another tool's format, as ``needlebench export``.
 
         Args:
             format: ``mjcf``, ``urdf``, ``gltf`` for the cell; ``mcap``, ``trajectory``, ``urscript`` for a motion.
-            out: file; in ``out/NAME`` if left out.
-            goal: of a motion or a posture; the scenario's only one if left out.
-            configuration: of the goal; of a motion the recommended one if left out.
-            engine: whose motion it is.
+            out: file [default: in ``out/NAME``].
+            goal: goal of a motion or a posture [default: the scenario's only goal].
+            configuration: configuration of the goal [default for a motion: the recommended one].
+            engine: physics engine that simulates the motion.
             joints: posture of the cell, rad: (6,).
             progress: ``True`` shows a bar; a function is called with message, done and total.
 
         Returns:
-            Each file that was written: ``name``, ``bytes``, ``sha256``.
+            Each written file: ``name``, ``bytes``, ``sha256``.
 
         Raises:
-            InputError: what ``needlebench export`` refuses, such as a configuration that does not work.
+            InputError: input that ``needlebench export`` rejects, e.g. an infeasible configuration.
         """
         listed = None
         if joints is not None:
@@ -339,6 +346,6 @@ class Scenario:
         return answer.data["files"]
 
     def command(self, name: str, **options: Any) -> Any:
-        """JSON answer of a command that takes a scenario, such as ``s.command("pairs")``."""
+        """Runs a command on the scenario and returns its JSON answer, e.g. ``s.command("pairs")``."""
         given = {key: value for key, value in self._options.items() if value is not None}
         return command(name, self.file, **given, **options).data

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Study:
-    """A study that is finished: a table with a row for each case, goal and configuration, and its statistics."""
+    """A completed study: a table with a row for each case, goal and configuration, and its statistics."""
 
     def __init__(self, file: Path, folder: Path, summary: dict[str, Any]) -> None:
         self.file = file
@@ -27,7 +27,7 @@ class Study:
         self.folder = folder
         """Folder of its results."""
         self.summary: dict[str, Any] = summary
-        """Statistics, criteria and answer, as ``needlebench study --json`` prints them."""
+        """Statistics, criteria and answer, as printed by ``needlebench study --json``."""
 
     @property
     def path(self) -> Path:
@@ -40,7 +40,7 @@ class Study:
         return self.summary["verdict"]
 
     def check(self) -> Study:
-        """Itself if all criteria were met; raises `CriterionFailed` otherwise."""
+        """Returns itself if all criteria are met; raises `CriterionFailed` otherwise."""
         if self.verdict != "pass":
             missed = [each for each in self.summary["criteria"] if not each.get("pass", False)]
             lines = [str(each) for each in [*missed, *self.summary["not_judged"]]]
@@ -48,24 +48,24 @@ class Study:
         return self
 
     def to_arrow(self) -> Any:
-        """The table as a ``pyarrow.Table``; needs ``pyarrow``."""
+        """The table as a ``pyarrow.Table``; requires ``pyarrow``."""
         import pyarrow.parquet
 
         parquet: Any = pyarrow.parquet
         return parquet.read_table(self.path)
 
     def to_polars(self) -> polars.DataFrame:
-        """The table as a Polars frame; needs ``polars``."""
+        """The table as a Polars frame; requires ``polars``."""
         import polars
 
         return polars.read_parquet(self.path)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The table as a pandas frame; needs ``pandas`` and ``pyarrow``."""
+        """The table as a pandas frame; requires ``pandas`` and ``pyarrow``."""
         return self.to_arrow().to_pandas()
 
     def case(self, number: int) -> dict[str, Any]:
-        """One case computed again: its layout and its rows.
+        """Recomputes one case; returns its layout and rows.
 
         Raises:
             InputError: there is no such case.
@@ -89,37 +89,37 @@ def study(
     shards: int | None = None,
     **options: Any,
 ) -> Study:
-    """Computes a study, or goes on with one.
+    """Computes or resumes a study.
 
-    The table has the same bytes as that of ``needlebench study``. An interrupt keeps what is computed: call again with
+    The table is byte-identical to that of ``needlebench study``. An interrupt keeps completed cases: call again with
     ``resume=True``.
 
-    With a ``client`` of Dask the study is computed on its workers, which need this package and see the same folders
-    under the same names. Each shard is a process that is asked for again if its worker is lost; called again after an
-    interrupt, it goes on. Shards are kept in ``out/NAME/shards`` and are of no use once the table is there.
+    With a Dask ``client`` the study is computed on its workers, which require this package and access to the same
+    folders under the same paths. Each shard is a process that is started again if its worker is lost; the same call
+    resumes after an interrupt. Shards are in ``out/NAME/shards`` and can be deleted once the table is complete.
 
     Args:
         path: study file (TOML).
-        out: folder; results are written into ``out/NAME``.
-        jobs: threads; as many as there are cores if left out. Results do not depend on it.
-        resume: go on with what is there.
-        yes: start what is expected to take longer than 20 minutes, too.
+        out: folder; results are written to ``out/NAME``.
+        jobs: number of threads [default: all cores]; does not affect results.
+        resume: continue with completed cases.
+        yes: start also if the expected time exceeds 20 minutes.
         page: write the page.
         progress: ``True`` shows a bar; a function is called with message, done and total.
-        client: ``distributed.Client``, or anything with its ``submit`` and ``nthreads``; ``jobs`` are the threads of a
-            shard then, one if left out.
-        shards: in how many parts the client's workers compute it; four for each thread of a worker if left out.
-        options: further options of ``needlebench study``, such as ``csv=True``.
+        client: ``distributed.Client``, or an object with its ``submit`` and ``nthreads``; ``jobs`` is then the number
+            of threads per shard [default: 1].
+        shards: number of parts for the client's workers [default: four per worker thread].
+        options: further options of ``needlebench study``, e.g. ``csv=True``.
 
     Raises:
-        InputError: what ``needlebench study`` refuses.
-        EnvironmentFailed: with a client: a shard could not be computed, however often it was asked for again.
-        Interrupted: interrupted; finished cases are kept.
+        InputError: input that ``needlebench study`` rejects.
+        EnvironmentFailed: with a client: a shard failed in spite of restarts.
+        Interrupted: interrupted; completed cases are kept.
     """
     if client is not None:
         return _on_client(client, path, out, jobs, shards, page, progress, options)
     if shards is not None:
-        raise InputError("shards: only with a client; study_shard computes one by itself")
+        raise InputError("shards: requires a client; study_shard computes a single shard")
     answer = command(
         "study",
         path,
@@ -144,17 +144,17 @@ def _on_client(
     progress: bool | Progress | None,
     options: dict[str, Any],
 ) -> Study:
-    """A study whose shards are computed on workers."""
+    """Computes the shards of a study on workers, and merges them."""
     from ._cluster import study_on
 
     robot = {name: value for name, value in options.items() if name in ROBOT_OPTIONS}
     folder = study_on(client, path, out, shards, jobs or 1, robot, progress)
-    # All that is not of the robot is of the table.
+    # All options that are not of the robot are of the table.
     return merge(path, [folder], out=out, page=page, progress=progress, **options)
 
 
 ROBOT_OPTIONS = ("arm", "robot", "prefix", "package_path", "calibration", "missing_inertia")
-"""Options that decide what is computed."""
+"""Options that affect the results."""
 
 
 def study_shard(
@@ -168,15 +168,15 @@ def study_shard(
     progress: bool | Progress | None = None,
     **options: Any,
 ) -> Path:
-    """Computes one of several parts of a study, for `merge`; asked for again it goes on, or returns at once.
+    """Computes one of several parts of a study, for `merge`; called again, it resumes or returns at once.
 
     Args:
         path: study file (TOML).
-        shard: which, from 1.
-        shards: of how many.
-        out: folder of this shard alone.
-        jobs: threads.
-        resume: go on with what is there.
+        shard: number of the part, from 1.
+        shards: number of parts.
+        out: folder of this shard only.
+        jobs: number of threads.
+        resume: continue with completed cases.
         progress: ``True`` shows a bar; a function is called with message, done and total.
         options: further options of ``needlebench study``.
 
@@ -208,19 +208,19 @@ def merge(
     progress: bool | Progress | None = None,
     **options: Any,
 ) -> Study:
-    """Joins the shards of a study: the same bytes as the study in one piece.
+    """Joins the shards of a study, byte-identical to the study in one piece.
 
     Args:
         path: study file (TOML).
-        shards: folders that `study_shard` gave.
-        out: folder; results are written into ``out/NAME``.
-        jobs: threads.
+        shards: folders returned by `study_shard`.
+        out: folder; results are written to ``out/NAME``.
+        jobs: number of threads.
         page: write the page.
         progress: ``True`` shows a bar; a function is called with message, done and total.
         options: further options of ``needlebench merge``.
 
     Raises:
-        InputError: shards of another study, or some are missing.
+        InputError: shards of another study, or missing shards.
     """
     answer = command("merge", path, *shards, out=out, jobs=jobs, no_page=not page, progress=progress, **options)
     return _finished(path, out, answer.data)

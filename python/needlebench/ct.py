@@ -1,4 +1,4 @@
-"""CT volumes: what one is, synthetic ones, surfaces and scenarios made of them, routes for a needle."""
+"""CT volumes: description, synthesis, conversion to scenarios, and needle paths."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ __all__ = ["build", "info", "routes", "synth"]
 
 
 def info(path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
-    """What a volume is: voxels, spacing, orientation, Hounsfield units, and what is odd about it.
+    """Describes a volume: voxels, spacing, orientation, Hounsfield units and irregularities.
 
     Args:
         path: NIfTI or DICOM file, or a folder of DICOM files.
         options: further options of ``needlebench ct info``.
 
     Raises:
-        InputError: what cannot be read, and why.
+        InputError: the volume cannot be read, with the reason.
     """
     return command("ct", "info", path, **options).data
 
@@ -35,16 +35,16 @@ def synth(
     progress: bool | Progress | None = None,
     **options: Any,
 ) -> dict[str, Any]:
-    """Makes a synthetic CT of a phantom or of a scenario's.
+    """Synthesises a CT of a phantom or of a scenario's phantom.
 
     Args:
         phantom: a phantom's name, or a scenario file.
         out: folder of the volume.
         progress: ``True`` shows a bar; a function is called with message, done and total.
-        options: further options of ``needlebench ct synth``, such as ``preset="thick"``.
+        options: further options of ``needlebench ct synth``, e.g. ``preset="thick"``.
 
     Raises:
-        InputError: what ``needlebench ct synth`` refuses.
+        InputError: input that ``needlebench ct synth`` rejects.
     """
     return command("ct", "synth", phantom, out=out, progress=progress, **options).data
 
@@ -57,12 +57,12 @@ def build(
     progress: bool | Progress | None = None,
     **options: Any,
 ) -> Path:
-    """Makes a patient of a scan: surfaces, labels, a report, and a scenario to run.
+    """Builds a patient from a scan: surfaces, labels, a report and a scenario.
 
     Args:
         path: NIfTI or DICOM file, or a folder of DICOM files.
         out: folder of the patient.
-        lesions: names, and a point in each in the scan's coordinates (LPS, mm).
+        lesions: seed point of each lesion by its name, mm in the scan (LPS).
         progress: ``True`` shows a bar; a function is called with message, done and total.
         options: further options of ``needlebench ct build``.
 
@@ -70,7 +70,7 @@ def build(
         The scenario file, for `Scenario.load`.
 
     Raises:
-        InputError: what ``needlebench ct build`` refuses.
+        InputError: input that ``needlebench ct build`` rejects.
     """
     points = [f"{name}={','.join(map(repr, point))}" for name, point in (lesions or {}).items()]
     command("ct", "build", path, out=out, lesion=points, progress=progress, **options)
@@ -83,14 +83,14 @@ def routes(
     progress: bool | Progress | None = None,
     **options: Any,
 ) -> dict[str, Any]:
-    """Straight ways for a needle to a lesion, with the robot: which directions are free, why others are not, the best.
+    """Plans needle paths to a lesion, with the robot: admissible directions, reasons for rejection, the best paths.
 
     Args:
-        path: folder of a patient that `build` made, or a scenario file.
+        path: patient folder written by `build`, or a scenario file.
         progress: ``True`` shows a bar; a function is called with message, done and total.
-        options: further options of ``needlebench ct routes``, such as ``lesion="lower"``.
+        options: further options of ``needlebench ct routes``, e.g. ``lesion="lower"``.
 
     Raises:
-        InputError: what ``needlebench ct routes`` refuses.
+        InputError: input that ``needlebench ct routes`` rejects.
     """
     return command("ct", "routes", path, progress=progress, **options).data

@@ -1,18 +1,22 @@
-//! An arm by itself: forward kinematics, and its limits.
+//! An arm: forward kinematics and joint limits.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use needlebench::KinematicArm;
-use needlebench_cell::{Overrides, PackagePaths, Robot, load_robot};
+use needlebench_bench::EntryFinder;
+use needlebench_cell::Robot;
 use needlebench_engine::{ENGINES, engine_names};
+use needlebench_input::PackagePaths;
 use needlebench_kinematics::{Joints, Pose, UrModel};
+use needlebench_scenario::{EntryChooser, Overrides, load_robot};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{array, poses, postures};
 use crate::errors::{input_error, wrong_argument};
 
-/// The arm of a name.
+/// The arm with a name.
 pub(crate) fn model_named(py: Python<'_>, name: &str) -> PyResult<UrModel> {
     name.parse()
         .map_err(|error: needlebench_kinematics::UnknownUrModel| {
@@ -25,7 +29,7 @@ pub(crate) fn model_named(py: Python<'_>, name: &str) -> PyResult<UrModel> {
         })
 }
 
-/// What files and packages replace of a scenario or an arm.
+/// Files and packages that override parts of a scenario or an arm.
 pub(crate) fn overrides(
     py: Python<'_>,
     robot: Option<PathBuf>,
@@ -40,7 +44,7 @@ pub(crate) fn overrides(
     let missing_inertia = missing_inertia
         .map(|text| {
             text.parse().map_err(|error: String| {
-                let hint = "what to do where the URDF of an arm has no inertia";
+                let hint = "give a policy for links without inertia";
                 wrong_argument(py, "missing_inertia", error, hint)
             })
         })
@@ -53,9 +57,7 @@ pub(crate) fn overrides(
         calibration,
         engines: engine_names(ENGINES),
         missing_inertia,
-        choose_entry: Some(needlebench_cell::EntryChooser(
-            needlebench_bench::choose_entry,
-        )),
+        choose_entry: Some(EntryChooser(Arc::new(EntryFinder::default()))),
     })
 }
 
@@ -94,11 +96,11 @@ impl Arm {
         let overrides = overrides(py, robot, None, prefix, calibration, packages, None)?;
         let robot = load_robot(&overrides).map_err(|finding| input_error(py, &[finding]))?;
         Ok(Self {
-            arm: KinematicArm::of_robot(&robot),
+            arm: KinematicArm::of_robot(&robot.robot, &robot.description),
         })
     }
 
-    /// The maker's name where it is a known arm.
+    /// The manufacturer's name if it is a known arm.
     #[getter]
     fn name(&self) -> &str {
         &self.arm.name
@@ -108,7 +110,7 @@ impl Arm {
         format!("Arm({})", self.arm.name)
     }
 
-    /// Least and greatest joint positions, rad: two arrays of six; infinite where a joint has no limit.
+    /// Lower and upper joint limits, rad: two arrays of six; infinite for joints without limits.
     #[getter]
     fn limits_rad<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let limits = &self.arm.limits;
@@ -139,7 +141,7 @@ pub(crate) fn fk<'py>(
     forward(py, &arm, joints)
 }
 
-/// The same as the command `fk` prints, of every posture.
+/// The answer of the command `fk`, for every posture.
 pub(crate) fn forward<'py>(
     py: Python<'py>,
     arm: &KinematicArm,

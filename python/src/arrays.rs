@@ -14,19 +14,19 @@ use pyo3::types::PyDict;
 
 use crate::errors::wrong_argument;
 
-/// Doubles in rows, as they lie in a NumPy array.
+/// Doubles in rows of a NumPy array.
 pub(crate) struct Rows<'py> {
     array: PyReadonlyArrayDyn<'py, f64>,
     /// Shape of one row.
     pub row: Vec<usize>,
     /// Number of rows.
     pub count: usize,
-    /// It was one row and not an array of rows.
+    /// It is a single row, not an array of rows.
     pub is_single: bool,
 }
 
 impl<'py> Rows<'py> {
-    /// Reads what NumPy makes an array of: one row, or several, of one of the given shapes.
+    /// Reads anything that NumPy converts to an array: one row, or several, of one of the given shapes.
     pub fn new(given: &Bound<'py, PyAny>, name: &str, shapes: &[&[usize]]) -> PyResult<Self> {
         let py = given.py();
         let array = match given.cast::<PyArrayDyn<f64>>() {
@@ -75,7 +75,7 @@ fn converted<'py>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, 
         .import("numpy")?
         .call_method("asarray", (given,), Some(&options))
         .map_err(|error| {
-            let message = format!("it is no array of numbers: {}", error.value(py));
+            let message = format!("not an array of numbers: {}", error.value(py));
             wrong_argument(
                 py,
                 name,
@@ -99,7 +99,7 @@ fn options(shapes: &[&[usize]]) -> String {
     shapes.join(" or ")
 }
 
-/// Joint positions of one posture or several, rad; refuses numbers that are not finite.
+/// Joint positions of one posture or several, rad; rejects numbers that are not finite.
 pub(crate) fn postures(given: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<Joints>, bool)> {
     let rows = Rows::new(given, name, &[&[JOINT_COUNT]])?;
     let numbers = rows.numbers()?;
@@ -117,7 +117,7 @@ pub(crate) fn postures(given: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<Jo
             "joint positions are numbers in rad",
         ));
     }
-    // As the command line doubts: no arm has joint positions of more than two turns.
+    // As on the command line: no arm has joint positions of more than two turns.
     if let Some(most) = numbers.iter().find(|value| value.abs() > 2.0 * TAU) {
         let text = format!(
             "joint positions are in rad, and {most} rad are {:.1} turns; {most} deg would be {:.4} rad",
@@ -135,7 +135,7 @@ pub(crate) fn postures(given: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<Jo
     ))
 }
 
-/// A NumPy array of doubles in the given shape; without its first axis if it is of one thing.
+/// A NumPy array of doubles in the given shape; without its first axis for a single item.
 pub(crate) fn array<'py>(
     py: Python<'py>,
     values: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Long work beside the interpreter: without its lock, watched, and ended by its signals.
+//! Long work beside the interpreter: without its lock, with progress, interrupted by its signals.
 
 use std::ffi::OsString;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,10 +14,10 @@ use pyo3::types::PyList;
 
 use crate::errors;
 
-/// How often signals and progress are looked at.
+/// Polling period of signals and progress.
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// How far the work is.
+/// Progress of the work.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 struct State {
     message: String,
@@ -26,7 +26,7 @@ struct State {
     notices: Vec<String>,
 }
 
-/// Keeps how far the work is until somebody looks.
+/// Stores the progress until it is polled.
 #[derive(Debug, Default)]
 struct Watched(Mutex<State>);
 
@@ -59,22 +59,22 @@ impl Progress for Watched {
     }
 }
 
-/// What long work is given.
+/// The context of long work.
 #[derive(Clone)]
 pub(crate) struct Task {
     pub cancel: Arc<AtomicBool>,
     pub progress: Arc<dyn Progress + Send + Sync>,
 }
 
-/// What became of long work.
+/// The result of long work.
 pub(crate) struct Done<T> {
     pub value: T,
-    /// What interrupted it: a signal's exception, or that of a callback.
+    /// The exception that interrupted it: of a signal or of a callback.
     pub interrupted: Option<PyErr>,
 }
 
-/// Does long work on a thread of its own, tells `progress(message, done, total)` how far it is, and interrupts it when the
-/// interpreter has a signal or the callback raises.
+/// Does long work on its own thread, calls `progress(message, done, total)`, and interrupts the work on a signal of the
+/// interpreter or an exception of the callback.
 pub(crate) fn in_background<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -119,14 +119,14 @@ pub(crate) fn in_background<T: Send + 'static>(
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(PyRuntimeError::new_err(
-                    "this is a bug of needlebench, not of your input",
+                    "this is a bug in needlebench, not in your input",
                 ));
             }
         }
     }
 }
 
-/// Tells what is new.
+/// Calls the callback with new progress.
 fn tell(progress: Option<&Bound<'_, PyAny>>, watched: &Watched, told: &mut State) -> PyResult<()> {
     let mut state = watched.state().clone();
     if state == *told {
@@ -144,11 +144,11 @@ fn tell(progress: Option<&Bound<'_, PyAny>>, watched: &Watched, told: &mut State
     Ok(())
 }
 
-/// What a command left: see [`invoke`].
+/// The result of a command: see [`invoke`].
 type Answer<'py> = (u8, String, String, Bound<'py, PyList>, Option<Py<PyAny>>);
 
-/// Runs a command of the command line in this process: its exit status, its output, its messages, what it found wrong, and
-/// the exception that interrupted it.
+/// Runs a command of the command line in this process; returns its exit status, output, messages, findings, and the
+/// exception that interrupted it.
 #[pyfunction]
 #[pyo3(signature = (arguments, progress=None))]
 pub(crate) fn invoke<'py>(
@@ -174,7 +174,7 @@ pub(crate) fn invoke<'py>(
     ))
 }
 
-/// The program on its terminal. Gives its exit status.
+/// Runs the program on its terminal. Returns its exit status.
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| needlebench::main_with(arguments).code())

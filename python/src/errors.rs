@@ -1,7 +1,7 @@
-//! What is wrong, as exceptions of the package.
+//! Errors as exceptions of the package.
 
 use needlebench::findings_text;
-use needlebench_cell::Finding;
+use needlebench_input::Finding;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 

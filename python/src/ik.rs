@@ -1,4 +1,4 @@
-//! Inverse kinematics of many poses in closed form, into memory that NumPy looks at.
+//! Inverse kinematics of many poses in closed form, in memory shared with NumPy.
 
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 
@@ -17,12 +17,12 @@ use crate::arm::model_named;
 use crate::arrays::{Flat, Rows, postures};
 use crate::errors::wrong_argument;
 
-/// Poses that are laid out and solved at a time: they and their answers fit into the nearest caches.
+/// Number of poses per block: they and their answers fit into the nearest caches.
 const CHUNK: usize = 256;
-/// Calls with fewer poses keep the interpreter's lock: giving it away costs as much as they.
+/// Calls with fewer poses keep the interpreter's lock: releasing it costs as much as the work.
 const DETACHED: usize = 64;
 
-/// All eight configurations of poses, in the memory that they were computed in.
+/// The solutions of poses in all eight configurations, without copies.
 #[pyclass(frozen, module = "needlebench._native")]
 pub(crate) struct IkAnswers {
     memory: Mutex<Memory>,
@@ -30,11 +30,11 @@ pub(crate) struct IkAnswers {
     is_single: bool,
 }
 
-/// Where the answers lie.
+/// State of the memory of the answers.
 enum Memory {
-    /// Nobody has looked yet.
+    /// Not shared with NumPy yet.
     Answers(Vec<ClosedForm>),
-    /// The same memory, as NumPy's.
+    /// Shared with NumPy.
     Array(Py<Flat>),
     /// Being written to without the interpreter's lock.
     InUse,
@@ -56,8 +56,8 @@ pub(crate) fn ik<'py>(
         return Err(wrong_argument(
             py,
             "tolerance",
-            format!("it is {tolerance:?}, outside 0 to 0.001 m and rad"),
-            "it is in metres and radians: 1e-6 is a micrometre and a microradian",
+            format!("{tolerance:?} is outside 0 to 0.001 m and rad"),
+            "the unit is metres and radians: 1e-6 is a micrometre and a microradian",
         ));
     }
     let seed = match seed {
@@ -99,18 +99,18 @@ pub(crate) fn ik<'py>(
             py,
             "out",
             format!(
-                "it has place for {} poses, not {}",
+                "it has space for {} poses, {} given",
                 out.get().count,
                 rows.count
             ),
-            "take the answers of an earlier call with poses of the same shape, or leave it out",
+            "use the answers of an earlier call with poses of the same shape, or omit `out`",
         ));
     }
     out.get().fill(py, &asked, layout, numbers)?;
     Ok(out)
 }
 
-/// Lengths as the command line solves with, bit for bit: found again from the chain.
+/// Link lengths of the command line, bit for bit, recovered from the chain.
 fn geometry_of(model: UrModel) -> UrGeometry {
     static FOUND: LazyLock<Vec<(UrModel, UrGeometry)>> = LazyLock::new(|| {
         let found = |model: UrModel| {
@@ -123,7 +123,7 @@ fn geometry_of(model: UrModel) -> UrGeometry {
     found.map_or_else(|| model.geometry(), |(_, geometry)| *geometry)
 }
 
-/// Works without the interpreter's lock where that is worth while.
+/// Releases the interpreter's lock if the work is long enough.
 fn aside<T: Send>(py: Python<'_>, count: usize, work: impl FnOnce() -> T + Send) -> T {
     if count < DETACHED {
         work()
@@ -132,7 +132,7 @@ fn aside<T: Send>(py: Python<'_>, count: usize, work: impl FnOnce() -> T + Send)
     }
 }
 
-/// How a pose lies in an array.
+/// Layout of a pose in an array.
 #[derive(Clone, Copy)]
 enum Layout {
     /// Position (m), quaternion (w, x, y, z).
@@ -143,7 +143,7 @@ enum Layout {
     Matrix,
 }
 
-/// A coordinate beyond this is in another unit, m; as on the command line.
+/// A coordinate above this is in another unit, m; as on the command line.
 const FARTHEST_M: f64 = 10.0;
 
 impl Layout {
@@ -155,7 +155,7 @@ impl Layout {
         }
     }
 
-    /// What the command line would refuse: the row, and a hint. Quaternions that are none have a certificate that says so.
+    /// Rejects what the command line rejects, with row and hint. Invalid quaternions get a certificate of their own.
     fn check(self, numbers: &[f64]) -> Result<(), (String, String)> {
         if matches!(self, Self::Quaternion) {
             return Ok(());
@@ -187,22 +187,23 @@ impl Layout {
                     return Ok(());
                 }
                 let message = format!(
-                    "the rotation vector is {angle_rad:.4} rad long, but a whole turn is {:.4} rad",
+                    "the length of the rotation vector is {angle_rad:.4} rad, above a full turn of {:.4} rad",
                     std::f64::consts::TAU
                 );
-                let hint = "rx, ry and rz are an axis times an angle in radians, as the controller shows them";
+                let hint =
+                    "rx, ry and rz are axis times angle in radians, as shown by the controller";
                 Err((message, hint.to_owned()))
             }
             Self::Matrix => {
                 if pose[12..] != [0.0, 0.0, 0.0, 1.0] {
                     let message = format!("the last row of the matrix is {:?}", &pose[12..]);
-                    return Err((message, "it is 0, 0, 0, 1 in every pose".to_owned()));
+                    return Err((message, "0, 0, 0, 1 required".to_owned()));
                 }
                 match pose_from_matrix(&rotation_of(pose), Vector3::zeros()) {
                     Ok(_) => Ok(()),
                     Err(error) => Err((
                         error.to_string(),
-                        "its columns are the axes of the flange, each of length 1".to_owned(),
+                        "the columns are the axes of the flange, each of length 1".to_owned(),
                     )),
                 }
             }
@@ -225,7 +226,7 @@ impl Layout {
     }
 }
 
-/// As its numbers stand: what is no rotation gets the certificate that says so.
+/// The numbers unchanged: an invalid rotation gets a certificate of its own.
 #[inline]
 fn of_quaternion(&[x, y, z, w, i, j, k]: &[f64; 7]) -> Pose {
     Pose::from_parts(
@@ -238,7 +239,7 @@ fn rotation_of(pose: &[f64]) -> nalgebra::Matrix3<f64> {
     nalgebra::Matrix3::from_fn(|row, column| pose[4 * row + column])
 }
 
-/// What is asked of every pose.
+/// The settings for every pose.
 struct Asked {
     geometry: UrGeometry,
     limits: JointLimits,
@@ -247,7 +248,7 @@ struct Asked {
 }
 
 impl Asked {
-    /// Into new memory, each part of which is touched while it is in a cache.
+    /// Solves into new memory, each part of which is first written while it is in a cache.
     fn solve_anew(&self, layout: Layout, numbers: &[f64]) -> Vec<ClosedForm> {
         let count = numbers.len() / layout.length();
         let mut answers = Vec::with_capacity(count);
@@ -259,7 +260,7 @@ impl Asked {
         answers
     }
 
-    /// Into memory that exists.
+    /// Solves into existing memory.
     fn solve_into(&self, layout: Layout, numbers: &[f64], answers: &mut [ClosedForm]) {
         let chunks = numbers.chunks(CHUNK * layout.length());
         for (chunk, answers) in chunks.zip(answers.chunks_mut(CHUNK)) {
@@ -312,7 +313,7 @@ impl IkAnswers {
             }
             Memory::InUse => {
                 return Err(PyRuntimeError::new_err(
-                    "these answers are being written to by another thread",
+                    "another thread is writing to these answers",
                 ));
             }
         };
@@ -331,7 +332,7 @@ impl IkAnswers {
         let mut borrowed = array.try_readwrite()?;
         let doubles = borrowed.as_slice_mut()?;
         let answers = ClosedForm::of_doubles(doubles).ok_or_else(|| {
-            PyRuntimeError::new_err("the memory of these answers was changed by somebody else")
+            PyRuntimeError::new_err("the memory of these answers was changed by other code")
         })?;
         aside(py, self.count, || {
             asked.solve_into(layout, numbers, answers);
@@ -339,7 +340,7 @@ impl IkAnswers {
         Ok(())
     }
 
-    /// The memory as NumPy's, from now on.
+    /// Shares the memory with NumPy.
     fn array<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, Flat>> {
         let mut memory = self.memory();
         let made = match std::mem::replace(&mut *memory, Memory::InUse) {
@@ -347,7 +348,7 @@ impl IkAnswers {
             Memory::Array(array) => array.into_bound(py),
             Memory::InUse => {
                 return Err(PyRuntimeError::new_err(
-                    "these answers are being written to by another thread",
+                    "another thread is writing to these answers",
                 ));
             }
         };
@@ -387,7 +388,7 @@ impl IkAnswers {
     }
 }
 
-/// Places of [`ClosedForm::BYTES`].
+/// Offsets in [`ClosedForm::BYTES`].
 #[derive(Clone, Copy)]
 enum Column {
     Exists,
@@ -408,7 +409,7 @@ impl IkAnswers {
         format!("IkAnswers of {} poses", self.count)
     }
 
-    /// Joint positions, rad: (n, 8, 6), by configuration; NaN where there is none. A view.
+    /// Joint positions, rad: (n, 8, 6), by configuration; NaN without a solution. A view.
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let array = self
@@ -425,31 +426,31 @@ impl IkAnswers {
         self.first_if_single(joints)
     }
 
-    /// Which configurations there are: (n, 8).
+    /// Which configurations have a solution: (n, 8).
     #[getter]
     fn exists<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.bits(py, Column::Exists)
     }
 
-    /// Which stand for another one too: (n, 8).
+    /// Which are coincident solutions: (n, 8).
     #[getter]
     fn merged<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.bits(py, Column::Merged)
     }
 
-    /// Which stand for a family with a free wrist 3: (n, 8).
+    /// Which stand for a family of solutions with free wrist 3: (n, 8).
     #[getter]
     fn wrist_3_is_free<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.bits(py, Column::Free)
     }
 
-    /// Which miss the pose by no more than the tolerance: (n, 8).
+    /// Which are boundary solutions: (n, 8).
     #[getter]
     fn touching<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.bits(py, Column::Touching)
     }
 
-    /// What the answers are worth, as places in `CERTIFICATES`: (n,). A view.
+    /// Certificates of completeness, as indices into `CERTIFICATES`: (n,). A view.
     #[getter]
     fn certificate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let bytes = self.bytes(py, Column::Certificate)?;

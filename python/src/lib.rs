@@ -1,8 +1,8 @@
-//! needlebench for Python: what is quick goes through arrays, what is long through the same functions as the command line.
+//! needlebench for Python: fast functions on arrays, long ones through the functions of the command line.
 //!
-//! Private to the Python package beside it (`needlebench/`), which has the documentation for users. Nothing is decided
-//! here: arrays are checked and laid out, functions are called without the interpreter's lock, and what is wrong becomes an
-//! exception with the lines and hints of the command line.
+//! Private to the Python package beside it (`needlebench/`), which has the documentation for users. This module only
+//! checks and arranges arrays, calls functions without the interpreter's lock, and converts errors to exceptions with the
+//! lines and hints of the command line.
 
 mod arm;
 mod arrays;
@@ -32,7 +32,7 @@ mod _native {
     use pyo3::prelude::*;
     use pyo3::types::{PyModule, PyTuple};
 
-    /// Names that arrays are in the order of.
+    /// Names in the order of arrays.
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         let py = module.py();

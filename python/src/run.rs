@@ -1,10 +1,10 @@
-//! What a run left: its report, its motions, its recordings.
+//! Results of a run: its report, motions and recordings.
 
 use std::sync::Arc;
 
 use needlebench_bench::{EngineRun, Runnable, ScenarioRun};
-use needlebench_cell::printable_json;
 use needlebench_evaluation::report::Verdict;
+use needlebench_input::printable_json;
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointState, JointTrajectory};
 use needlebench_planning::ConfigurationPlan;
@@ -70,13 +70,13 @@ impl Run {
         }
     }
 
-    /// It was interrupted, and what was finished until then is here.
+    /// Whether it was interrupted; completed results are available.
     #[getter]
     fn interrupted(&self) -> bool {
         self.run.interrupted
     }
 
-    /// What engines could not do.
+    /// Failures of engines.
     #[getter]
     fn engine_failures(&self) -> Vec<(String, String)> {
         let failures = self.run.report.engine_failures.iter();
@@ -92,7 +92,7 @@ impl Run {
         Ok(runs.iter().map(|run| run.engine).collect())
     }
 
-    /// What an engine recorded, at every step.
+    /// The recording of an engine, at every step.
     fn recording<'py>(
         &self,
         py: Python<'py>,
@@ -110,7 +110,7 @@ impl Run {
         recording(py, run, trajectory)
     }
 
-    /// Length of a planned motion, s; none where there is no motion.
+    /// Duration of a planned motion, s; none without a motion.
     #[pyo3(signature = (goal, configuration, *, retreat=false))]
     fn duration_s(&self, goal: &str, configuration: &str, retreat: bool) -> PyResult<Option<f64>> {
         let plan = self.plan(goal, configuration)?;

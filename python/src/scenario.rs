@@ -6,13 +6,15 @@ use std::sync::Arc;
 use needlebench::KinematicArm;
 use needlebench_bench::ct::{BuildFiles, LastScan, imaged, scanned};
 use needlebench_bench::{Control, RunOptions, Runnable, ScenarioRun, Stop};
-use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Cell, Finding, Overrides, load_scenario};
+use needlebench_cell::Cell;
 use needlebench_clearance::{CertificateOptions, ClearanceModel, PairClearance, certify};
 use needlebench_engine::ENGINES;
+use needlebench_input::Finding;
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_report::files::{Folder, RunFiles, write_run};
+use needlebench_scenario::scenario::EngineName;
+use needlebench_scenario::{Overrides, load_scenario};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -22,7 +24,7 @@ use crate::background::{Task, in_background};
 use crate::errors::{environment_failed, input_error, wrong_argument};
 use crate::run::Run;
 
-/// A scenario that was read and checked.
+/// A validated scenario.
 #[pyclass(frozen, module = "needlebench._native")]
 pub(crate) struct Scenario {
     runnable: Arc<Runnable>,
@@ -95,7 +97,7 @@ impl Scenario {
 
     #[getter]
     fn arm(&self) -> String {
-        self.runnable.scenario().cell.robot.arm_name()
+        self.runnable.scenario().robot_description.arm_name.clone()
     }
 
     #[getter]
@@ -121,11 +123,14 @@ impl Scenario {
     }
 
     fn fk<'py>(&self, py: Python<'py>, joints: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
-        let arm = KinematicArm::of_robot(&self.runnable.scenario().cell.robot);
+        let arm = {
+            let scenario = self.runnable.scenario();
+            KinematicArm::of_robot(&scenario.cell.robot, &scenario.robot_description)
+        };
         forward(py, &arm, joints)
     }
 
-    /// Least clearances by class, of every posture; all pairs on request.
+    /// Minimum clearances by class, for every posture; all pairs on request.
     #[pyo3(signature = (joints, *, pairs=false))]
     fn clearance<'py>(
         &self,
@@ -161,7 +166,7 @@ impl Scenario {
         Ok(answer)
     }
 
-    /// Proven clearances of the straight joint motions through postures, with the scenario's speeds.
+    /// Certified clearances of joint-space lines through postures, with the scenario's speeds.
     #[pyo3(signature = (joints, *, tolerance_m=1e-4))]
     fn certify<'py>(
         &self,
@@ -173,8 +178,8 @@ impl Scenario {
             return Err(wrong_argument(
                 py,
                 "tolerance_m",
-                format!("it is {tolerance_m:?}, outside 1e-9 to 0.1 m"),
-                "it is how far the proven bound may be below what is attained, in metres",
+                format!("{tolerance_m:?} is outside 1e-9 to 0.1 m"),
+                "it is the largest gap between certified bound and attained minimum, in metres",
             ));
         }
         let (postures, _) = postures(joints, "joints")?;
@@ -183,7 +188,7 @@ impl Scenario {
             return Err(wrong_argument(
                 py,
                 "joints",
-                "a motion has two postures or more",
+                "a motion requires two postures or more",
                 "give an array of shape (n, 6)",
             ));
         };
@@ -217,15 +222,15 @@ impl Scenario {
         Ok(answer)
     }
 
-    /// Plans, simulates and measures; writes into `out/NAME` if that is given.
-    #[pyo3(signature = (*, engines=None, jobs=None, referee=false, out=None, pictures=true, page=true, record=None, progress=None))]
+    /// Plans, simulates and measures; writes to `out/NAME` if `out` is given.
+    #[pyo3(signature = (*, engines=None, jobs=None, reference=false, out=None, pictures=true, page=true, record=None, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn run<'py>(
         &self,
         py: Python<'py>,
         engines: Option<Vec<String>>,
         jobs: Option<usize>,
-        referee: bool,
+        reference: bool,
         out: Option<PathBuf>,
         pictures: bool,
         page: bool,
@@ -239,7 +244,7 @@ impl Scenario {
         let options = RunOptions {
             engines,
             jobs: threads.max(1),
-            referee,
+            referee: reference,
             ..RunOptions::default()
         };
         options
@@ -289,7 +294,7 @@ struct Job {
     mcap: bool,
 }
 
-/// Why there is no run.
+/// Failures of a run.
 enum Failure {
     Input(Vec<Finding>),
     Environment(String),
@@ -333,9 +338,9 @@ impl Job {
                 cancel: &task.cancel,
                 engines: ENGINES,
             };
-            write_run(
+            finished.report = write_run(
                 runnable.scenario(),
-                &mut finished,
+                &finished,
                 Folder(folder),
                 files,
                 task.progress.as_ref(),
@@ -348,7 +353,7 @@ impl Job {
         Ok((runnable, finished))
     }
 
-    /// The scenario as it is run: that of what is seen in its scan, if it begins with one.
+    /// The scenario to run: that built from its scan, if it has a section `[ct]`.
     fn scanned(&self, task: &Task) -> Result<Arc<Runnable>, Failure> {
         let resolved = self.runnable.scenario();
         if resolved.scenario.ct.is_none() {
@@ -396,7 +401,7 @@ fn witnesses(pair: &PairClearance) -> [f64; 6] {
     [a.x, a.y, a.z, b.x, b.y, b.z]
 }
 
-/// What one class is at each posture.
+/// The clearances of one class, for each posture.
 fn series<'py>(
     py: Python<'py>,
     cell: &Cell,
@@ -422,7 +427,7 @@ fn series<'py>(
     Ok(made)
 }
 
-/// All pairs of bodies at each posture: they are the same in each.
+/// All pairs of bodies, the same for each posture.
 fn all_pairs<'py>(
     py: Python<'py>,
     cell: &Cell,

@@ -68,7 +68,7 @@ def test_an_interrupted_study_goes_on(scenarios: Path, tmp_path: Path) -> None:
     layouts = scenarios / "studies/layouts.toml"
     timer = threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
-    with pytest.raises(nb.Interrupted, match="--resume goes on"):
+    with pytest.raises(nb.Interrupted, match="--resume continues"):
         nb.study(layouts, out=tmp_path, jobs=1, yes=True, page=False)
     timer.join()
     told: list[tuple[str, int, int]] = []

@@ -130,7 +130,7 @@ def test_memory_is_used_again() -> None:
         assert nb.ik(second, out=answers) is answers
         assert np.array_equal(answers.joints, nb.ik(second).joints, equal_nan=True)
         assert view is None or np.shares_memory(view, answers.joints)
-    with pytest.raises(nb.InputError, match="place for 1000 poses"):
+    with pytest.raises(nb.InputError, match="space for 1000 poses"):
         nb.ik(first[:10], out=answers)
 
 
@@ -169,7 +169,7 @@ def test_a_quaternion_that_is_none_says_so() -> None:
     ("poses", "words"),
     [
         ([1.0, 2.0, 3.0], ["poses", "(3,)", "(7,) or (6,) or (4, 4)"]),
-        ("nonsense", ["poses", "no array of numbers"]),
+        ("nonsense", ["poses", "not an array of numbers"]),
         ([[0.1, 0.2, 300.0, 0.0, 0.0, 0.0]], ["pose 0", "300.0", "metres"]),
         ([0.1, 0.2, 0.3, 0.0, 0.0, 90.0], ["rotation vector is 90.0000 rad", "radians"]),
         ([0.1, 0.2, float("nan"), 0.0, 0.0, 0.0], ["NaN"]),

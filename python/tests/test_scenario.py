@@ -99,6 +99,17 @@ def test_a_run_is_that_of_the_command_line(
     held_against_csv(best, tmp_path / "package" / "table3" / "pose" / f"{best.label}.rapier.csv")
 
 
+def test_the_reference_integrator_is_asked_by_its_name_and_by_the_old_one(table3: nb.Scenario) -> None:
+    asked = table3.run(["rapier"], reference=True)
+    with pytest.warns(DeprecationWarning, match="`referee` is now `reference`"):
+        as_before = table3.run(["rapier"], referee=True)
+    report, before = json.loads(asked.to_json()), json.loads(as_before.to_json())
+    for each in (report, before):
+        del each["timings"]
+    assert report == before
+    assert report["goals"][0]["configurations"][0]["referee"]["rapier"]["convergence"]
+
+
 def held_against_csv(configuration: nb.Configuration, file: Path) -> None:
     recording = configuration.recording
     with file.open() as lines:
