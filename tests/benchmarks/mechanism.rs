@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, UnitVector3, Vector3};
 use needlebench_cell::{
-    BodyKind, Cell, CollisionBody, Frame, Link, ModelSource, Needle, NeedleCorridor, Robot, Tool,
+    BodyKind, Cell, CollisionBody, Frame, Link, Needle, NeedleCorridor, Robot, Tool,
 };
 use needlebench_geometry::{Shape, Solid};
 use needlebench_kinematics::{
@@ -103,7 +103,6 @@ impl Mechanism {
             chain,
             base: link("base", Vec::new()),
             links,
-            members: Vec::new(),
             bodies,
             limits: JointLimits(std::array::from_fn(|_| JointLimit {
                 lower_rad: -100.0,
@@ -111,11 +110,6 @@ impl Mechanism {
                 velocity_rad_s: 100.0,
                 effort_nm: 1e3,
             })),
-            arm: None,
-            source: source(),
-            calibration: None,
-            meshes: Vec::new(),
-            notes: Vec::new(),
         };
         Cell::assemble(
             robot,
@@ -156,13 +150,6 @@ fn link(name: &str, solids: Vec<Solid>) -> Link {
     }
 }
 
-fn source() -> ModelSource {
-    ModelSource {
-        file: "benchmark".into(),
-        sha256: String::new(),
-    }
-}
-
 /// A tool without mass or shape: the flange is the ball's centre.
 fn tool() -> Tool {
     Tool {
@@ -180,6 +167,5 @@ fn tool() -> Tool {
             outer_diameter_m: 1.47e-3,
             length_m: 0.15,
         },
-        source: source(),
     }
 }

@@ -13,12 +13,13 @@ mod servo_step;
 use std::path::Path;
 use std::time::Duration;
 
-use needlebench_cell::{Cell, Overrides, resolve_scenario};
+use needlebench_cell::Cell;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
     MujocoPlant, MujocoSettings, Plant, RapierPlant, RapierSettings, RefereePlant, RefereeSettings,
     TorqueHold,
 };
+use needlebench_scenario::{Overrides, resolve_scenario};
 
 /// The shipped UR3 with its tool and nothing around it that it could touch.
 fn ur3() -> Cell {

@@ -254,7 +254,7 @@ async function testBase(page, scenario, name) {
       expected = postures(file, POSTURES_ELSEWHERE);
     } catch (error) {
       assert.ok(
-        (await page.locator('.explore [role=alert]').textContent()).includes(' in the '),
+        (await page.locator('.explore [role=alert]').textContent()).includes(' overlaps the '),
         `${toml}: ${error.message}`,
       );
       continue;
@@ -287,7 +287,7 @@ async function testConfigurations(page) {
   for (const label of ok) assert.equal(found.find((each) => each.label === label).outcome, 'works', label);
   const reached = found.findIndex((each) => each.joints);
   await page
-    .getByRole('button', { name: /^Take the posture/ })
+    .getByRole('button', { name: /^Use the posture/ })
     .nth(reached)
     .click();
   const at = await page.evaluate((index) => {

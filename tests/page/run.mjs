@@ -46,12 +46,32 @@ export async function testNearest(page, settle) {
   const pinned = await page.evaluate(
     () => NB.current.view.labels.find((each) => each.layer === 'witness').element.textContent,
   );
-  assert.match(pinned, /^least /);
+  assert.match(pinned, /^minimum, /);
   await page.evaluate(() => NB.current.seek(NB.current.time > 0.5 ? NB.current.time - 0.5 : NB.current.time + 0.5));
   const moved = await page.evaluate(
     () => NB.current.view.labels.find((each) => each.layer === 'witness').element.textContent,
   );
-  assert.doesNotMatch(moved, /^least /);
+  assert.doesNotMatch(moved, /^minimum, /);
+}
+
+/**
+ * What the page calls clearance is the terminal's column of that name, with self-clearance apart.
+ * @param {Page} page
+ */
+export async function testClearance(page) {
+  const differing = await page.evaluate(() => {
+    const { page: document, report } = NB.current;
+    return report.goals.flatMap(({ configurations }, goal) => {
+      const all = document.goals[goal].columns.side;
+      const column = all.find(({ keys }) => keys.includes('clearance_attained'));
+      return configurations.flatMap(({ label, metrics, clearance }) => {
+        const key = column?.keys.find((each) => metrics[each] !== undefined);
+        const found = NB.leastAround(document, clearance)?.minimum_m;
+        return found === metrics[key] ? [] : [`${label}: ${found} m is no ${key} of ${metrics[key]} m`];
+      });
+    });
+  });
+  assert.deepEqual(differing, []);
 }
 
 /**
@@ -60,7 +80,7 @@ export async function testNearest(page, settle) {
  * @param {(page: Page) => Promise<unknown>} settle
  */
 export async function testGhosts(page, settle) {
-  await page.getByRole('button', { name: 'All as ghosts' }).click();
+  await page.getByRole('button', { name: 'Show all ghosts' }).click();
   await settle(page);
   const { labels, expected, colors } = await page.evaluate(() => ({
     labels: NB.current.view.labels
@@ -71,7 +91,7 @@ export async function testGhosts(page, settle) {
   }));
   assert.deepEqual(labels, expected);
   assert.equal(colors, 8);
-  await page.getByRole('button', { name: 'No ghosts' }).click();
+  await page.getByRole('button', { name: 'Hide all ghosts' }).click();
 }
 
 /**
@@ -132,7 +152,7 @@ export async function testSaving(page) {
   const svg = curves.bytes.toString();
   assert.match(svg, /^<svg [^>]*width="85mm"/);
   assert.ok(svg.includes('clearance (mm)') && svg.includes('time (s)'), 'axes without units');
-  const view = await save('The view: save as PNG');
+  const view = await save('3D view: save as PNG');
   assert.equal(view.bytes.subarray(1, 4).toString(), 'PNG');
 }
 
@@ -182,7 +202,7 @@ export async function testPoses(page, picture) {
 export async function testEvents(page) {
   const asked = await page.evaluate(() => NB.current.goal.configurations.some((each) => each.events));
   if (!asked) return;
-  for (const title of ['Contacts that were asked for', 'Emergency stop', 'Way back']) {
+  for (const title of ['Prescribed contacts', 'Emergency stop', 'Retreat']) {
     const table = page.locator('h3', { hasText: title }).locator('xpath=following-sibling::div[1]//tbody/tr');
     assert.ok((await table.count()) > 0, `${title}: nothing`);
   }

@@ -31,12 +31,12 @@ async function answerFirst(page) {
     };
   });
   assert.ok(found.sentence?.toLowerCase().startsWith(found.wanted.toLowerCase()), 'the page has no answer');
-  assert.match(found.sentence, /\d %? .*interval .* to /, 'the answer has no figure with an interval');
+  assert.match(found.sentence, /\d %? .*(CI|interval) .* to /, 'the answer has no figure with an interval');
   assert.ok(found.before && found.bottom < 900, 'the answer is not on the first screen');
   assert.ok(found.choices, 'choices are not drawn');
   assert.equal(found.cells.length, found.criteria);
   for (const [criterion, met, ...rest] of found.cells) {
-    assert.match(met, /met|missed|not judged/, `${criterion} has no verdict`);
+    assert.match(met, /met|failed|not evaluated/, `${criterion} has no verdict`);
     assert.ok(
       rest.some((text) => /\d.*\(.* to .*\)/.test(text)),
       `${criterion} has no value with its interval`,

@@ -1,4 +1,4 @@
-// A planning session in headless Chromium, as a doctor would have it, on the folder that `ct build` made:
+// A planning session in headless Chromium, as a physician would use it, on the folder that `ct build` made:
 //
 //   npm ci && node view.mjs --out SCREENSHOTS --program NEEDLEBENCH [--marks] FOLDER LESION ENTRY
 //
@@ -103,7 +103,7 @@ async function open(url, browser = running, size = { width: 1600, height: 1000 }
 const settled = (page) =>
   page.waitForFunction(
     () =>
-      document.querySelector('.bar > .soft').textContent === 'kept' &&
+      document.querySelector('.bar > .soft').textContent === 'saved' &&
       !PLAN.planner.quick.busy &&
       !PLAN.planner.bounds.busy &&
       !PLAN.planner.exact.busy &&
@@ -267,7 +267,7 @@ await frames(page);
 // The needle: lesion by its button, entry by a click.
 await page.getByRole('button', { name: `Target: ${lesion.replaceAll('_', ' ')}` }).click();
 await pointTo(page, entry);
-await page.getByRole('radio', { name: 'Click the entry' }).click();
+await page.getByRole('radio', { name: 'Set entry' }).click();
 await click(page, 0, entry);
 await settled(page);
 const route = await page.evaluate(() => PLAN.planner.route);
@@ -278,7 +278,7 @@ for (const [axis, metres] of target.entries())
 assert.ok(
   Math.abs(route.length_m - Math.hypot(...route.entry_m.map((metres, axis) => metres - route.target_m[axis]))) < 1e-12,
 );
-assert.match(await page.innerText('.side'), /Skin to target mm\s+\d+\.\d/);
+assert.match(await page.innerText('.side'), /Skin to target \(mm\)\s+\d+\.\d/);
 // It is on the slice that holds its end, in its colour.
 await pointTo(page, route.target_index.map(Math.round));
 await canvas(page, 'Axial').focus();
@@ -302,9 +302,9 @@ await page.screenshot({ path: join(out, 'view-zoomed.png') });
 await page.keyboard.press('0');
 await frames(page);
 
-// Configurations: one that works is chosen with the keyboard, its motion planned and played.
+// Configurations: a feasible one is chosen with the keyboard, its motion planned and played.
 const working = await page.evaluate(() => PLAN.planner.reach.preview.configurations.findIndex((each) => each.works));
-assert.ok(working >= 0, 'no configuration works');
+assert.ok(working >= 0, 'no configuration is feasible');
 const rows = page.locator('table.choose tbody tr');
 assert.equal(await rows.count(), 8);
 await rows.nth(0).focus();
@@ -323,15 +323,15 @@ const { motion, chosen } = await page.evaluate(() => ({
 }));
 assert.equal(motion.configuration, chosen);
 assert.ok(motion.tip, `no expected error: ${motion.tip_unknown}`);
-assert.match(await page.innerText('.side'), /Expected tip error at the target: \d+\.\d\d mm rms/);
+assert.match(await page.innerText('.side'), /RMS tip error at the target: \d+\.\d\d mm, \d+\.\d\d mm lateral/);
 
 // What it leaves to people, in numbers and in the room.
 await page.waitForFunction(() => PLAN.planner.people.answer);
 const { room } = await page.evaluate(() => PLAN.planner.people.answer);
 assert.ok(room.free_fraction > 0 && room.free_fraction <= 1 && room.sight.length > 0);
-assert.match(await page.innerText('.side'), /Space for people: \d+ % of the half ball[\s\S]*What people see/);
+assert.match(await page.innerText('.side'), /Free space: \d+ % of the hemisphere[\s\S]*Line of sight/);
 const empty = await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL());
-for (const layer of ['people and sight', 'cone for the hand']) {
+for (const layer of ['people and line of sight', 'hand cone']) {
   const without = await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL());
   await page.getByLabel(layer).check();
   await frames(page);
@@ -342,7 +342,7 @@ for (const layer of ['people and sight', 'cone for the hand']) {
   );
 }
 await page.screenshot({ path: join(out, 'view-people.png') });
-for (const layer of ['people and sight', 'cone for the hand']) await page.getByLabel(layer).uncheck();
+for (const layer of ['people and line of sight', 'hand cone']) await page.getByLabel(layer).uncheck();
 await frames(page);
 assert.equal(
   empty,
@@ -362,7 +362,7 @@ assert.notEqual(
 await page.evaluate(() => PLAN.planner.room.stop());
 
 // Two routes side by side; taken back and brought back.
-await page.getByRole('button', { name: 'Keep this route' }).click();
+await page.getByRole('button', { name: 'Keep path' }).click();
 const moved = await page.evaluate(() => PLAN.planner.shown.entry);
 const [x, y] = await spot(page, 1, moved);
 await pointTo(page, moved.map(Math.round));
@@ -387,7 +387,7 @@ console.log(
     `${reach[Math.floor(0.95 * reach.length)].toFixed(1)} ms, of ${reach.length}`,
 );
 if (marks) assert.ok(median < MARKS.median && p95 < MARKS.p95, 'numbers come late');
-await page.getByRole('button', { name: 'Keep this route' }).click();
+await page.getByRole('button', { name: 'Keep path' }).click();
 await page.waitForFunction(() => document.querySelectorAll('table.route thead th').length >= 5);
 const length = await page.evaluate(() => PLAN.planner.route.length_m);
 const state = () => page.evaluate(() => JSON.stringify([PLAN.planner.state.needle, PLAN.planner.state.routes]));
@@ -420,7 +420,7 @@ assert.ok(
 );
 
 // The entry map: what it says is free is free voxel by voxel, and a click on it is an entry.
-const find = page.getByRole('button', { name: 'Find routes to the target' });
+const find = page.getByRole('button', { name: 'Find needle paths' });
 const asked = Date.now();
 await find.click();
 await page.waitForFunction(() => PLAN.planner.entryMap.plan?.map, null, { timeout: 60_000 });
@@ -506,15 +506,15 @@ const turned = outwards([plan.map.azimuth_deg[picked], plan.map.elevation_deg[pi
   0,
 );
 assert.ok(turned > Math.cos((3 * Math.PI) / 180), 'the entry is where the map was clicked');
-assert.match(await page.innerText('.side'), /By the rules of routes\s+free, odds/);
+assert.match(await page.innerText('.side'), /Path rules\s+admissible, odds ratio/);
 await page.screenshot({ path: join(out, 'view-entry-map.png') });
 // Without a mouse.
 await map.focus();
 await page.keyboard.press('ArrowRight');
-assert.match(await page.innerText('.entry-said'), /of the front/);
+assert.match(await page.innerText('.entry-said'), /of anterior/);
 // The route that the plan chooses, with its configuration; it is the one of `ct routes`.
 assert.ok(plan.chosen, 'no route is chosen');
-await page.getByRole('button', { name: '(chosen)' }).click();
+await page.getByRole('button', { name: '(recommended)' }).click();
 await settled(page);
 const best = plan.routes[plan.chosen.route];
 assert.equal(await page.evaluate(() => PLAN.planner.state.needle.configuration), best.best);
@@ -542,21 +542,21 @@ allowed.add('409');
 await page.getByRole('textbox', { name: 'Notes' }).fill('by this tab');
 await page.waitForSelector('.banner.shown');
 assert.match(await page.innerText('.banner'), /changed in another tab/);
-await page.getByRole('button', { name: 'Reload what the other tab has' }).click();
+await page.getByRole('button', { name: 'Load the other version' }).click();
 await settled(page);
 assert.equal(await page.inputValue('textarea'), 'by the other tab');
 await other.close();
 
 // The route that was kept first, as a plan: what `check` and `run` take.
-await page.getByRole('button', { name: 'Take route 1' }).click();
+await page.getByRole('button', { name: 'Use path 1' }).click();
 await settled(page);
 await page.getByRole('button', { name: 'Save plan' }).click();
-await page.waitForFunction(() => /Saved as planned.toml|Save it as refused/.test(document.body.innerText));
-const agree = page.getByRole('button', { name: 'Save it as refused' });
+await page.waitForFunction(() => /Saved as planned.toml|Save as rejected/.test(document.body.innerText));
+const agree = page.getByRole('button', { name: 'Save as rejected' });
 const refusal = await page.evaluate(() => PLAN.planner.route?.refusal);
 assert.equal(Boolean(refusal), (await agree.count()) > 0, 'a needle that is refused is asked about, and no other');
 if (refusal) {
-  assert.match(await page.innerText('.side'), /This needle is refused/);
+  assert.match(await page.innerText('.side'), /Needle path rejected/);
   assert.doesNotMatch(await page.innerText('table.choose'), /\byes\b/);
   await page.screenshot({ path: join(out, 'view-refused.png') });
   await agree.click();

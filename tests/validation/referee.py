@@ -1,4 +1,4 @@
-"""Figures of a run with `--referee`: how far its engines are from the third integrator, and of which order they are.
+"""Figures of a run with `--reference`: how far its engines are from the third integrator, and of which order they are.
 
     python3 tests/validation/referee.py REPORT_JSON
 

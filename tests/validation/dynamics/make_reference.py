@@ -24,7 +24,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 ROBOT = "models/ur3/ur3.urdf"
 TOOL = "models/needle_guide/offset.urdf"
-OTHER_FRAMES = "crates/cell/tests/cell/foreign_urdf/arm.urdf"
+OTHER_FRAMES = "crates/scenario/tests/scenario/foreign_urdf/arm.urdf"
 
 SEED = 20260101
 STATES = 45

@@ -7,8 +7,10 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3};
-use needlebench_cell::{Overrides, Robot, Tool, load_robot, resolve_scenario, sha256_hex};
+use needlebench_cell::{Robot, Tool};
+use needlebench_input::sha256_hex;
 use needlebench_kinematics::{Dynamics, Joints, Pose, rotation_angle_between};
+use needlebench_scenario::{Overrides, load_robot, resolve_scenario};
 use serde::Deserialize;
 
 /// Ten times the worst that is seen, 7.5e-16 m: some roundings of coordinates near 1 m.
@@ -93,7 +95,7 @@ fn load(case: &Case, gravity_m_s2: f64) -> Model {
             gravity_m_s2: Vector3::new(0.0, 0.0, -gravity_m_s2),
         };
         return Model {
-            robot,
+            robot: robot.robot,
             tool: None,
             dynamics,
         };

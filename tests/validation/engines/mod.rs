@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use nalgebra::{Matrix6, Point3, Vector3};
-use needlebench_cell::{Cell, Goal, Overrides, ResolvedScenario, resolve_scenario};
+use needlebench_cell::Cell;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
@@ -15,6 +15,7 @@ use needlebench_engine::{
 };
 use needlebench_kinematics::{Joints, Pose, rotation_angle_between};
 use needlebench_planning::Planner;
+use needlebench_scenario::{Goal, Overrides, ResolvedScenario, resolve_scenario};
 
 /// Six compositions of poses with coordinates below 2 m, in metres and radians; 1.6e-15 is seen.
 const LINK_POSE: f64 = 2e-14;

@@ -10,8 +10,8 @@ mod tracking;
 
 use needlebench_kinematics::ik::{Certificate, GaussNewtonOptions, Numerical, closed_form};
 use needlebench_kinematics::pose_sets::{PoseSet, rounded_to_f32};
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry, UrModel, base_from_base_link};
+use needlebench_numerics::random::SplitMix64;
 
 use double_double::{Complex, Real};
 use tally::{Row, Tally};

@@ -8,8 +8,8 @@
 //! As `make_reference.py`, but in 106 bits and along another path.
 
 use nalgebra::{ComplexField as _, Matrix6, Vector6};
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
+use needlebench_numerics::random::SplitMix64;
 
 use super::double_double::{Complex, Real};
 

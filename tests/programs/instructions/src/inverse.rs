@@ -8,8 +8,8 @@ use needlebench_kinematics::ik::{
     closed_form_into,
 };
 use needlebench_kinematics::pose_sets::PoseSet;
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
+use needlebench_numerics::random::SplitMix64;
 
 /// Does the operation so often, each time for another pose.
 pub fn run(operation: &str, count: usize) {

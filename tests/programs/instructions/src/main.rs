@@ -8,15 +8,15 @@ use std::hint::black_box;
 use std::path::Path;
 
 use needlebench_bench::study::StaticWorker;
-use needlebench_cell::{
-    Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, load_scenario,
-};
 use needlebench_clearance::{CertificateOptions, ClearanceModel, certify};
 use needlebench_engine::{
     Actuation, Hooks, Plant, RapierPlant, RapierSettings, Servo, ServoGains, simulate,
 };
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
+use needlebench_scenario::{
+    Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, load_scenario,
+};
 
 const SCENARIO: &str = "scenarios/table3.toml";
 const TIMESTEP_S: f64 = 1e-3;

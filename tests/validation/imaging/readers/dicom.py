@@ -437,7 +437,7 @@ def multi_frame(reader: Reader, folder: Path) -> None:
     legacy = slice_of(0, stored_slices()[0], (0, 0, 0), NumberOfFrames=3)
     legacy.PixelData = legacy.PixelData * 3
     legacy.save_as(folder / "frames-at-one-place.dcm", enforce_file_format=True)
-    refused(reader.one(folder / "frames-at-one-place.dcm"), "same place")
+    refused(reader.one(folder / "frames-at-one-place.dcm"), "same position")
 
 
 def folders(reader: Reader, folder: Path) -> None:
@@ -505,10 +505,10 @@ def folders(reader: Reader, folder: Path) -> None:
     shutil.copytree(path, path / "again")
     answer = reader.one(path)
     same(answer, *expected(copies))
-    remarked(answer, "there twice")
+    remarked(answer, "duplicates")
 
     twice = [*series(), series()[2]]
-    refused(reader.one(saved(folder / "duplicate", twice)), "same place", "mm along the normal")
+    refused(reader.one(saved(folder / "duplicate", twice)), "same position", "mm along the slice normal")
 
     holed = series()
     del holed[2]
@@ -530,7 +530,7 @@ def folders(reader: Reader, folder: Path) -> None:
         for at, (stored, height) in enumerate(zip(stored_slices(count=7), heights, strict=True))
     ]
     answer = reader.one(saved(folder / "uneven", uneven))
-    remarked(answer, "interpolated to even steps of 1.000 mm")
+    remarked(answer, "interpolated to a uniform 1.000 mm")
     source, _ = expected(uneven)
     for k in range(answer.hu().shape[2]):
         upper = min(int(np.searchsorted(heights, k, side="right")), 6)
@@ -544,7 +544,7 @@ def folders(reader: Reader, folder: Path) -> None:
     remarked(reader.one(saved(folder / "rounded", rounded)), "rounding")
     aside = series()
     aside[3].ImagePositionPatient[0] += 2
-    refused(reader.one(saved(folder / "aside", aside)), "beside the line")
+    refused(reader.one(saved(folder / "aside", aside)), "off the line")
 
 
 def odd(reader: Reader, folder: Path) -> None:
@@ -564,21 +564,21 @@ def odd(reader: Reader, folder: Path) -> None:
     refused(one("no-position", ImagePositionPatient=None), "ImagePositionPatient")
     refused(one("no-orientation", ImageOrientationPatient=None), "ImageOrientationPatient")
     refused(one("no-spacing", PixelSpacing=None), "PixelSpacing")
-    refused(one("not-square", ImageOrientationPatient=[1, 0, 0, 0.5, 1, 0]), "right angles")
+    refused(one("not-square", ImageOrientationPatient=[1, 0, 0, 0.5, 1, 0]), "not perpendicular")
     refused(one("mr", Modality="MR"), "MR", "not CT")
-    remarked(one("no-modality", Modality=None), "modality is not said")
+    remarked(one("no-modality", Modality=None), "modality is not stated")
     refused(one("colours", PhotometricInterpretation="PALETTE COLOR"), "PALETTE COLOR")
     refused(one("slope-0", RescaleSlope=0), "(0028,1053)")
-    remarked(one("no-rescale", RescaleSlope=None, RescaleIntercept=None), "stored numbers are taken as HU")
+    remarked(one("no-rescale", RescaleSlope=None, RescaleIntercept=None), "stored values are used as HU")
     remarked(one("unit", RescaleType="US"), "US")
     remarked(one("lossy", LossyImageCompression="01"), "loss")
     remarked(one("water-padding", PixelPaddingValue=1024), "not applied")
     refused(one("bits", BitsStored=17), "17 bits")
-    refused(one("pixels", PixelData=b"12"), "cut off")
+    refused(one("pixels", PixelData=b"12"), "truncated")
     commas = series()
     for each in commas:
         each[0x00280030] = pydicom.DataElement(0x00280030, "LO", "0,75\\0,5")
-    refused(reader.one(saved(folder / "commas", commas)), "(0028,0030)", "no number")
+    refused(reader.one(saved(folder / "commas", commas)), "(0028,0030)", "not a number")
 
     path = saved(folder / "cut", series())
     victim = sorted(path.iterdir())[1]
@@ -623,7 +623,7 @@ def odd(reader: Reader, folder: Path) -> None:
     (folder / "no-ending").write_bytes(data[:at] + b"1.2.840.10008.1.2\0\0\0" + data[at + 20 :])
     answer = reader.one(folder / "no-ending")
     same(answer, *single_slice(single))
-    remarked(answer, "no VRs")
+    remarked(answer, "implicit VRs")
     shouting = slice_of(0, stored_slices()[0], (0, 0, 0), ConvolutionKernel="\x1b[31mB30f\x07")
     shouting.save_as(folder / "shouting.dcm", enforce_file_format=True)
     assert reader.one(folder / "shouting.dcm").text["description"]["kernel"] == "[31mB30f"
@@ -639,7 +639,7 @@ def odd(reader: Reader, folder: Path) -> None:
     answer = reader.one(path)
     assert answer.refused is None or "damaged" in answer.said, answer.said
     tilt = series(orientation=(1, 0, 0, 0, 0.96, -0.28), GantryDetectorTilt=-16)
-    remarked(reader.one(saved(folder / "tilt", tilt)), "the gantry was tilted")
+    remarked(reader.one(saved(folder / "tilt", tilt)), "tilted gantry")
     single = slice_of(0, stored_slices()[0], (0, 0, 0))
     single.save_as(folder / "single.dcm", enforce_file_format=True)
     remarked(reader.one(folder / "single.dcm"), "there is one slice")

@@ -146,15 +146,15 @@ def odd(reader: Reader, folder: Path) -> int:
     same(read("not-packed.nii.gz", good), hu, affine)
     answer = read("trailing.nii.gz", packed + b"garbage")
     same(answer, hu, affine)
-    remarked(answer, "no gzip")
-    remarked(read("trailing.nii", good + b"garbage"), "left unread")
+    remarked(answer, "not gzip")
+    remarked(read("trailing.nii", good + b"garbage"), "ignored")
     remarked(read("no-sum.nii.gz", packed[:-6]), "checksum")
     refused(read("wrong-sum.nii.gz", packed[:-8] + b"\0\0\0\0" + packed[-4:]), "damaged")
     for cut in [0, 1, 10, 30, len(packed) // 2, len(packed) - 40]:
         refused(read("cut.nii.gz", packed[:cut]))
     for cut in [0, 3, 347, 348, 351, 352, 353, len(good) - 1]:
         refused(read("cut.nii", good[:cut]))
-    refused(read("cut.nii", good[:-1]), "cut off", "copy or export")
+    refused(read("cut.nii", good[:-1]), "truncated", "copy or export")
     refused(read("text.nii.gz", b"this is no gzip"), "gzip")
     refused(read("text.nii", b"this is no volume" * 40), "348")
 
@@ -179,8 +179,8 @@ def odd(reader: Reader, folder: Path) -> int:
     refused(read("dim.nii", changed(42, b"\xff\xff")), "dim[1]")
     # 6000 x 6000 x 300: refused by the limit; 1024 x 1024 x 511: by what the file can hold.
     refused(read("vast.nii", changed(42, b"\x70\x17\x70\x17\x2c\x01")), "MiB")
-    refused(read("large.nii", changed(42, b"\x00\x04\x00\x04\xff\x01")), "cut off")
-    refused(read("large.nii.gz", gzip.compress(changed(42, b"\x00\x04\x00\x04\xff\x01"))), "cut off")
+    refused(read("large.nii", changed(42, b"\x00\x04\x00\x04\xff\x01")), "truncated")
+    refused(read("large.nii.gz", gzip.compress(changed(42, b"\x00\x04\x00\x04\xff\x01"))), "truncated")
     refused(read("offset.nii", changed(108, np.float32(100).tobytes())), "vox_offset")
     refused(read("offset.nii", changed(108, np.float32(np.nan).tobytes())), "vox_offset")
     same(read("offset0.nii", changed(108, np.float32(0).tobytes())), hu, affine)
@@ -201,7 +201,7 @@ def odd(reader: Reader, folder: Path) -> int:
     both = simple()
     both.set_qform(np.diag([-0.7, -0.7, 1.25, 1]), 1)
     answer = read("both.nii", bytes(raw(both)))
-    remarked(answer, "mm apart: the sform counts")
+    remarked(answer, "at a corner: the sform is used")
     same(answer, *reference(folder / "both.nii"))
     turned = nib.Nifti1Image(phantom().astype("i2"), None)
     turn = np.array([[0.0, -0.5, 0], [-0.6, 0, 0], [0, 0, 2.0]])
@@ -223,7 +223,7 @@ def odd(reader: Reader, folder: Path) -> int:
         got = answer.ct_from_index_mm()
         assert np.abs(got - LPS_FROM_RAS @ SHEARED).max() < 1e-4, got
     refused(read("metres-or-not.nii", bytes(raw(simple(unit="meter")))), "xyzt_units")
-    remarked(read("no-unit.nii", bytes(raw(simple(unit="unknown")))), "taken as mm")
+    remarked(read("no-unit.nii", bytes(raw(simple(unit="unknown")))), "mm assumed")
     unit_steps = nib.Nifti1Image(phantom().astype("i2"), np.eye(4))
     remarked(read("default.nii", bytes(raw(unit_steps))), "1 x 1 x 1 mm")
 
@@ -234,10 +234,10 @@ def odd(reader: Reader, folder: Path) -> int:
     remarked(read("halves.nii", bytes(raw(floats))), "rounded")
     circle = phantom().astype("i2")
     circle[0] = -3024
-    remarked(read("circle.nii", bytes(raw(nib.Nifti1Image(circle, SHEARED)))), "taken as air")
+    remarked(read("circle.nii", bytes(raw(nib.Nifti1Image(circle, SHEARED)))), "set to air")
     metal = phantom().astype("i2")
     metal[-1] = 3071
-    remarked(read("metal.nii", bytes(raw(nib.Nifti1Image(metal, SHEARED)))), "greatest value of 12 bits")
+    remarked(read("metal.nii", bytes(raw(nib.Nifti1Image(metal, SHEARED)))), "maximum 12-bit value")
     beyond = nib.Nifti1Image(np.full((4, 4, 4), 40000, "i4"), SHEARED)
     remarked(read("beyond.nii", bytes(raw(beyond))), "clipped")
     refused(reader.one(folder / "good.nii", "--series", "1"), "--series")

@@ -6,10 +6,10 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use needlebench_cell::{Overrides, load_scenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::{Overrides, load_scenario};
 use serde_json::json;
 
 fn main() -> std::io::Result<()> {

@@ -1,13 +1,13 @@
 //! Writes documents at, inside and outside every limit of the published schemas, one a line, with what
 //! the reader says of each. `tests/schema/check.py` compares that with an independent validator.
 
-#[path = "../../../../../crates/cell/tests/cell/schema_probes.rs"]
+#[path = "../../../../../crates/scenario/tests/scenario/schema_probes.rs"]
 mod probes;
 
 use std::io::Write as _;
 
-use needlebench_cell::scenario::{parse_scenario, scenario_schema};
-use needlebench_cell::study::{parse_study, study_schema};
+use needlebench_scenario::scenario::{parse_scenario, scenario_schema};
+use needlebench_scenario::study::{parse_study, study_schema};
 use serde_json::json;
 
 fn main() -> std::io::Result<()> {

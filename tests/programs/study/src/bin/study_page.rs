@@ -9,9 +9,10 @@
 use std::error::Error;
 use std::path::Path;
 
-use needlebench_cell::{Change, Finding, KeyPath, Overrides, ScenarioFamily, Setting};
+use needlebench_input::Finding;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_report::page::study::{CasePictures, StudyPage};
+use needlebench_scenario::{Change, KeyPath, Overrides, ScenarioFamily, Setting};
 use needlebench_study::{FactorValue, Outcome, Results};
 use serde_json::{Value, json};
 use synthetic::Synthetic;
@@ -92,20 +93,20 @@ fn summary(results: &Synthetic) -> Value {
         "confidence": 0.95,
         "verdict": "fail",
         "postures_only": "all",
-        "headline": "postures only: whether a motion gets there is not known",
+        "headline": "Postures only, motions not planned, not even in a sample of cases",
         "answer": {
-            "sentence": "best tool of 3: perpendicular; with it at least one configuration works in 93.0 % of 33334 \
-                layouts (95 % interval 92.7 to 93.3 %, which holds for all 3 at once)",
-            "remarks": ["the next, inline, works in 3.0 points fewer (95 % interval 2.0 to 4.0)"],
+            "sentence": "best of 3 candidates: perpendicular; at least one configuration is feasible in 93.0 % of 33334 \
+                layouts (simultaneous 95 % CI 92.7 to 93.3 %)",
+            "remarks": ["next: inline, 3.0 percentage points lower (95 % CI 2.0 to 4.0)"],
             "compared": [],
         },
         "criteria": [
             {"criterion": "min_layouts_working", "of": null, "choice": "perpendicular", "pass": false, "value": 0.93,
                 "interval": {"low": 0.927, "high": 0.933}, "limit": 0.95, "unit": "1", "confidence": false,
-                "detail": "layouts in which at least one configuration is ok", "cases": [12, 18], "requirement": "SRS-1 <b>"},
+                "detail": "layouts with at least one feasible configuration", "cases": [12, 18], "requirement": "SRS-1 <b>"},
             {"criterion": "max_tip_error_mm", "of": "best", "choice": "perpendicular", "pass": true, "value": 2.243e-13,
                 "interval": {"low": 2.1e-13, "high": 2.4e-13}, "limit": 2.7, "unit": "mm", "confidence": false,
-                "detail": "95 % quantile of the tip error", "cases": [77], "requirement": null},
+                "detail": "P95 tip error of the best configuration over 33334 layouts", "cases": [77], "requirement": null},
         ],
         "not_judged": [],
         "choices": choices,
@@ -150,7 +151,7 @@ fn choices(results: &Synthetic) -> Value {
         "axes": [{"factor": 1, "name": "tool", "unit": "", "role": "choice", "coarse": false,
             "bins": labels.map(|label| json!({"label": label, "low": null, "high": null}))}],
         "working_configurations": 2,
-        "ranked_by": "the share of its cases that work",
+        "ranked_by": "the share of cases with at least one feasible configuration",
         "held_out": null,
         "paired": true,
         "validity_differs": false,

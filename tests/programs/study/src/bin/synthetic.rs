@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use needlebench_study::{
     CSV_FILE, CaseError, CaseEvaluator, CaseResult, CaseWorker, ParquetResults, Progress,
     RESULTS_FILE, Results, StudyRun, write_csv,

@@ -19,12 +19,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use needlebench_cell::{BodyKind, Cell, Frame, Overrides, ResolvedScenario, load_scenario};
+use needlebench_cell::{BodyKind, Cell, Frame};
 use needlebench_clearance::ClearanceModel;
 use needlebench_geometry::{ConvexMesh, Shape, SolidMesh, TriangleMesh};
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_numerics::random::SplitMix64;
 use needlebench_planning::Planner;
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 use serde_json::{Value, json};
 
 /// Per pair: distance, witness points on A and B, normal, indices of the two closest solids.

@@ -9,7 +9,7 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use needlebench_geometry::mesh::convex_hull;
 use needlebench_geometry::{PreparedShape, Shape, SolidMesh, TriangleMesh, separation};
 use needlebench_kinematics::Pose;
-use needlebench_kinematics::random::SplitMix64;
+use needlebench_numerics::random::SplitMix64;
 use serde_json::{Value, json};
 
 /// Poses of each pair of shapes.
