@@ -23,9 +23,9 @@ while [ $# -gt 0 ]; do
     shift 2
 done
 # Not filled in, these are placeholders.
-case $releases in @*) fail "set NEEDLEBENCH_RELEASES to where releases are" ;; esac
+case $releases in @*) fail "set NEEDLEBENCH_RELEASES to the base URL of the releases" ;; esac
 case $version in @*) fail "give --version" ;; esac
-case $version in *[!0-9A-Za-z.+-]*|'') fail "'$version' is no version" ;; esac
+case $version in *[!0-9A-Za-z.+-]*|'') fail "'$version' is not a valid version" ;; esac
 
 case "$(uname -s) $(uname -m)" in
     'Linux x86_64') target=x86_64-unknown-linux-musl ;;

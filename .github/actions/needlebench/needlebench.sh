@@ -23,7 +23,7 @@ install() {
         # `uses: .../needlebench@v0.1.0` is the release of that name.
         version=${ACTION_REF#v}
         [[ $version =~ ^[0-9]+\.[0-9]+\.[0-9]+ ]] || {
-            printf '::error::give `version`: %s is no release\n' "${ACTION_REF:-the action}" >&2
+            printf '::error::set the input `version`: %s is not a release\n' "${ACTION_REF:-the action}" >&2
             return 2
         }
     fi
