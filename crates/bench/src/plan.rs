@@ -1,6 +1,5 @@
 //! The first stage: plans of all goals, and which motions are worth a simulation.
 
-use needlebench_cell::Rule;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::{ConfigurationPlan, GoalPlan};
 
@@ -63,16 +62,10 @@ fn simulated(setup: &Setup<'_>, plans: &[GoalPlan]) -> Vec<Job> {
         plan.trajectory.is_some()
             && (plan.rejections.is_empty()
                 || everything
-                    && plan.rejections.iter().all(|rejection| {
-                        matches!(
-                            rejection.rule,
-                            Rule::NeedleRoute
-                                | Rule::Collision
-                                | Rule::TooClose
-                                | Rule::NeedleCorridor
-                                | Rule::NoMotion
-                        )
-                    }))
+                    && plan
+                        .rejections
+                        .iter()
+                        .all(|rejection| rejection.rule.can_be_simulated()))
     };
     all(plans).filter(|job| worth(job.plan(plans))).collect()
 }

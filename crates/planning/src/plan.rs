@@ -4,7 +4,6 @@ use std::cell::OnceCell;
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
-use needlebench_cell::Rule;
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
 use needlebench_scenario::{Goal, Roll};
 
@@ -335,13 +334,8 @@ impl Planner<'_> {
         let Some(first) = rejections.first_mut() else {
             return;
         };
-        let others = match first.rule {
-            Rule::Collision | Rule::TooClose => "another base placement, tool or limit",
-            Rule::NeedleCorridor => "another base placement or tool",
-            Rule::Unreachable | Rule::Singular | Rule::JointLimit | Rule::Approach => {
-                "another base placement"
-            }
-            Rule::NeedleRoute | Rule::Merged | Rule::NearestOnly | Rule::NoMotion => return,
+        let Some(others) = first.rule.remedy() else {
+            return;
         };
         first.detail = match goal.roll {
             Roll::Free => {

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use needlebench_cell::Rule;
 use needlebench_evaluation::metric::{self, MetricKey};
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_kinematics::ik::Configuration;
@@ -138,10 +137,8 @@ pub fn metric_column(key: &MetricKey) -> MetricColumn {
 pub(super) fn broken_rule(rejections: &[Rejection]) -> Option<Cow<'static, str>> {
     let rejection = rejections.first()?;
     let name = rejection.rule.name();
-    Some(match (rejection.rule, rejection.class) {
-        (Rule::Collision | Rule::TooClose | Rule::NoMotion, Some(class)) => {
-            format!("{name} {}", class.name()).into()
-        }
+    Some(match rejection.class {
+        Some(class) if rejection.rule.is_of_a_class() => format!("{name} {}", class.name()).into(),
         _ => name.into(),
     })
 }

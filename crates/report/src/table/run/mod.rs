@@ -5,7 +5,7 @@ mod screen;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use needlebench_cell::{Rule, part_in_words, rule_in_words};
+use needlebench_cell::{Amount, Rule, part_in_words, rule_in_words};
 use needlebench_engine::Engine;
 use needlebench_evaluation::excitation;
 use needlebench_evaluation::iso9283::SUBJECT;
@@ -527,26 +527,22 @@ pub fn rejected_in_words<'r>(
 
 /// By how much a rule is violated; of some it is no number.
 fn by_how_much(rejection: &RejectionReport) -> String {
-    let is_rule = |rule: Rule| rejection.rule == rule.name();
     let (value, limit) = value_and_limit(rejection.value, rejection.limit, rejection.unit);
-    if is_rule(Rule::Merged) {
-        String::new()
-    } else if is_rule(Rule::Unreachable) {
-        format!(" (by {value})")
-    } else if is_rule(Rule::Singular) || is_rule(Rule::JointLimit) || is_rule(Rule::NearestOnly) {
-        format!(" ({value}, limit {limit})")
-    } else if is_rule(Rule::Approach) {
-        format!(" ({value}, {limit} required)")
-    } else if rejection.value < 0.0 {
-        let (depth, _) = value_and_limit(-rejection.value, rejection.limit, rejection.unit);
-        let required = if rejection.limit > 0.0 {
-            format!(", clearance {limit} required")
-        } else {
-            String::new()
-        };
-        format!(" (penetration {depth}{required})")
-    } else {
-        format!(" (clearance {value}, {limit} required)")
+    match Rule::named(rejection.rule).map_or(Amount::Distance, Rule::amount) {
+        Amount::None => String::new(),
+        Amount::Missed => format!(" (by {value})"),
+        Amount::Limited => format!(" ({value}, limit {limit})"),
+        Amount::Required => format!(" ({value}, {limit} required)"),
+        Amount::Distance if rejection.value < 0.0 => {
+            let (depth, _) = value_and_limit(-rejection.value, rejection.limit, rejection.unit);
+            let required = if rejection.limit > 0.0 {
+                format!(", clearance {limit} required")
+            } else {
+                String::new()
+            };
+            format!(" (penetration {depth}{required})")
+        }
+        Amount::Distance => format!(" (clearance {value}, {limit} required)"),
     }
 }
 
