@@ -3,10 +3,11 @@
 use needlebench_bench::Stop;
 use needlebench_input::{Finding, nothing_serves};
 use needlebench_study::StudyError;
+use serde::Serialize;
 
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
-use crate::output::complain;
+use crate::output::{complain, json_text, print_as_it_is};
 
 /// Why a command ends without an answer: the text on standard error, and the exit status.
 #[derive(Debug)]
@@ -21,6 +22,13 @@ pub(crate) enum Failure {
         status: ExitStatus,
         /// Message on standard error.
         message: String,
+    },
+    /// The input is refused, and a JSON document on standard output says why.
+    Answered {
+        /// Exit status of the program.
+        status: ExitStatus,
+        /// The document, as it is printed.
+        document: String,
     },
     /// The environment failed.
     Environment(anyhow::Error),
@@ -43,6 +51,14 @@ impl Failure {
         }
     }
 
+    /// A refusal that `--json` has as a document.
+    pub(crate) fn answered(status: ExitStatus, document: &impl Serialize) -> Self {
+        match json_text(document) {
+            Ok(document) => Self::Answered { status, document },
+            Err(error) => Self::Environment(error),
+        }
+    }
+
     /// Prints it, and returns the exit status.
     pub(crate) fn tell(self) -> ExitStatus {
         match self {
@@ -58,6 +74,10 @@ impl Failure {
                 complain(&message);
                 status
             }
+            Self::Answered { status, document } => match print_as_it_is(&document) {
+                Ok(()) => status,
+                Err(error) => Self::Environment(error).tell(),
+            },
             Self::Environment(error) => {
                 // A closed pipe (`needlebench ... | head`) is the reader's choice.
                 let closed = error
@@ -70,6 +90,15 @@ impl Failure {
                 ExitStatus::EnvironmentFailed
             }
         }
+    }
+}
+
+/// Exit status of a command that these findings refuse.
+pub(crate) fn status_of(findings: &[Finding]) -> ExitStatus {
+    if nothing_serves(findings) {
+        ExitStatus::CriterionFailed
+    } else {
+        ExitStatus::BadInput
     }
 }
 

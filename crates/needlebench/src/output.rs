@@ -7,8 +7,9 @@ use std::io::{IsTerminal, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use needlebench_input::{printable, printable_line};
+use needlebench_input::{printable, printable_json, printable_line};
 use needlebench_show::layout;
+use serde::Serialize;
 
 use crate::host;
 
@@ -60,6 +61,12 @@ pub(crate) fn print_as_it_is(text: &str) -> Result<()> {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other.context("cannot write to standard output"),
     }
+}
+
+/// A JSON document as it is printed on standard output.
+pub(crate) fn json_text(value: &impl Serialize) -> Result<String> {
+    let document = serde_json::to_string_pretty(value).map_err(std::io::Error::from)?;
+    Ok(printable_json(&document).into_owned())
 }
 
 /// Writes a plain text and a line end to standard error.

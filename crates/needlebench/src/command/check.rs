@@ -96,18 +96,22 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus, Failure> {
         };
     }
     take_findings(&findings);
-    print_json(&CheckAnswer {
+    let answer = CheckAnswer {
         schema_version: 1,
         ok,
         findings,
         notes,
         scenarios,
-    })?;
-    Ok(match (ok, bad_input) {
-        (true, _) => ExitStatus::Success,
+    };
+    let refused = match (ok, bad_input) {
+        (true, _) => {
+            print_json(&answer)?;
+            return Ok(ExitStatus::Success);
+        }
         (false, true) => ExitStatus::BadInput,
         (false, false) => ExitStatus::CriterionFailed,
-    })
+    };
+    Err(Failure::answered(refused, &answer))
 }
 
 /// The finding with its line, if it is about a key of the scenario's file.

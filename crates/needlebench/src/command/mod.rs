@@ -29,7 +29,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use needlebench_engine::{ENGINES, engine_names};
-use needlebench_input::{Finding, PackagePaths, printable_json};
+use needlebench_input::{Finding, PackagePaths};
 use needlebench_scenario::{EntryChooser, Overrides, ResolvedScenario, load_scenario};
 use serde::Serialize;
 
@@ -62,7 +62,7 @@ use needlebench_bench::{EntryFinder, Runnable};
 use crate::arguments::{RobotArguments, UrdfArguments};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
-use crate::output::{print_as_it_is, print_text};
+use crate::output::{json_text, print_as_it_is, print_text};
 
 /// Reads a scenario, and rejects one that cannot be run.
 fn load(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
@@ -97,8 +97,7 @@ fn urdf_overrides(arguments: &UrdfArguments) -> Result<Overrides, Finding> {
 
 /// Prints one JSON document to standard output.
 fn print_json(value: &impl Serialize) -> Result<()> {
-    let document = serde_json::to_string_pretty(value).map_err(std::io::Error::from)?;
-    print_as_it_is(&printable_json(&document))
+    print_as_it_is(&json_text(value)?)
 }
 
 /// Third-party licences, linked into the crate's folder.

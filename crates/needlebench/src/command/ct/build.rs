@@ -31,7 +31,7 @@ use crate::arguments::{PicturesArguments, RobotArguments};
 use crate::command::results_folder::ResultsFolder;
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::failure::Failure;
+use crate::failure::{Failure, status_of};
 use crate::interrupts::watch_interrupts;
 use crate::output::shown;
 use crate::progress::TerminalProgress;
@@ -209,15 +209,15 @@ pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus, Failu
             Ok(ExitStatus::Success)
         }
         Err(Failure::BadInput(findings)) if arguments.json => {
-            print_json(&BuildAnswer {
+            let answer = BuildAnswer {
                 schema_version: 1,
                 ok: false,
                 findings,
                 folder: arguments.out.display().to_string(),
                 scenario: None,
                 report: None,
-            })?;
-            Ok(ExitStatus::BadInput)
+            };
+            Err(Failure::answered(status_of(&answer.findings), &answer))
         }
         Err(failure) => Err(failure),
     }

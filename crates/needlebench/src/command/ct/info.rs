@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use crate::command::{print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::failure::Failure;
+use crate::failure::{Failure, status_of};
 use crate::interrupts::{threads, watch_interrupts};
 use crate::output::shown;
 
@@ -135,14 +135,14 @@ pub(crate) fn info(arguments: &InfoArguments) -> Result<ExitStatus, Failure> {
     let read = match read.map_err(|error| Stop::of_scan(&arguments.path, error)) {
         Ok(read) => read,
         Err(Stop::Refused(findings)) if arguments.json => {
-            print_json(&InfoAnswer {
+            let answer = InfoAnswer {
                 schema_version: 1,
                 ok: false,
                 findings,
                 remarks: Vec::new(),
                 volume: None,
-            })?;
-            return Ok(ExitStatus::BadInput);
+            };
+            return Err(Failure::answered(status_of(&answer.findings), &answer));
         }
         Err(stop) => return Err(Failure::of_stop(stop, "interrupted")),
     };

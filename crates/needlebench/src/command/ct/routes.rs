@@ -31,7 +31,7 @@ use crate::command::results_folder::prepare_folder;
 use crate::command::suggest::{ChosenEntry, set_entries, unplaced, write_scenario};
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::failure::Failure;
+use crate::failure::{Failure, status_of};
 use crate::interrupts::{threads, watch_interrupts};
 use crate::output::shown;
 use crate::progress::TerminalProgress;
@@ -163,7 +163,7 @@ pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus, Failure>
     let mut found = match found {
         Ok(found) => found,
         Err(Stop::Refused(findings)) if arguments.json => {
-            print_json(&RoutesAnswer {
+            let answer = RoutesAnswer {
                 schema_version: 1,
                 ok: false,
                 findings: &findings,
@@ -171,8 +171,8 @@ pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus, Failure>
                 targets: &[],
                 remarks: &[],
                 written: None,
-            })?;
-            return Ok(ExitStatus::BadInput);
+            };
+            return Err(Failure::answered(status_of(&findings), &answer));
         }
         Err(stop) => return Err(Failure::of_stop(stop, "interrupted")),
     };
