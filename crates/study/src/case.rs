@@ -17,10 +17,7 @@ pub struct CaseError {
 pub trait CaseEvaluator: Sync {
     /// A worker; it may hold scratch memory, caches and processes, but what it answers depends on the
     /// number of the case alone.
-    ///
-    /// # Errors
-    /// A message for people, where the environment does not allow any.
-    fn worker(&self) -> Result<Box<dyn CaseWorker + '_>, String>;
+    fn worker(&self) -> Box<dyn CaseWorker + '_>;
 }
 
 /// Computes cases, one by one.

@@ -26,7 +26,7 @@ use crate::control::Control;
 use crate::provenance::provenance;
 use crate::scenario_run::{ProtocolRun, RealArm, RunError, ScenarioRun};
 use crate::setup::Setup;
-use simulate::{Cycles, EngineCycles};
+use simulate::{CycleError, Cycles, EngineCycles};
 
 /// Runs the protocol of a scenario that has one.
 ///
@@ -78,10 +78,10 @@ pub(crate) fn run(
                 identities.push(cycles.identity);
                 engines.push((engine, cycles.attained, cycles.arrivals));
             }
-            Err(message) if !control.is_cancelled() => failures.push(EngineFailure {
+            Err(error) if !control.is_cancelled() => failures.push(EngineFailure {
                 engine: engine.to_owned(),
                 during: Some("ISO 9283".to_owned()),
-                message,
+                message: error.to_string(),
             }),
             Err(_) => {}
         }
@@ -128,7 +128,7 @@ fn simulate_engines(
     plan: &ProtocolPlan,
     engines: &[&'static dyn Engine],
     control: &Control<'_>,
-) -> Vec<(&'static str, Result<EngineCycles, String>)> {
+) -> Vec<(&'static str, Result<EngineCycles, CycleError>)> {
     let pool = EnginePool::new(engines);
     let settings = &setup.resolved.scenario.engines.settings();
     let sequences = 1 + u64::from(plan.directional.is_some());
@@ -189,7 +189,7 @@ fn measurement(
 
 /// Over the first cycles: largest distance at the same time, and between the attained positions.
 fn difference(
-    outcomes: &[(&'static str, Result<EngineCycles, String>)],
+    outcomes: &[(&'static str, Result<EngineCycles, CycleError>)],
 ) -> Option<EngineDifference> {
     let finished = outcomes.iter();
     let finished: Vec<(&'static str, &EngineCycles)> = finished

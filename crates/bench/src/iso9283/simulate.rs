@@ -42,6 +42,22 @@ pub(crate) struct EngineCycles {
     pub first_attained_m: Vec<Point3<f64>>,
 }
 
+/// Why an engine has no cycles.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum CycleError {
+    /// It could not simulate one of them.
+    #[error("cycle {cycle}: {source}")]
+    Cycle {
+        /// Number of the cycle, from 1.
+        cycle: usize,
+        /// What it reports.
+        source: EngineError,
+    },
+    /// It could not begin.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+}
+
 /// All cycles of one kind, by a perfect tracker.
 struct Repeated {
     attained: Vec<Attained>,
@@ -85,8 +101,8 @@ impl<'a> Cycles<'a> {
     /// Simulates the protocol.
     ///
     /// # Errors
-    /// What the engine or its process reports, in words.
-    pub fn simulate(mut self, plan: &ProtocolPlan) -> Result<EngineCycles, String> {
+    /// What the engine or its process reports, with the cycle if it is one's.
+    pub fn simulate(mut self, plan: &ProtocolPlan) -> Result<EngineCycles, CycleError> {
         let plain = self.repeat(&plan.cycle, 0.0)?;
         let plain_end_s = f64::from(self.protocol.cycles) * plan.cycle.trajectory.duration_s();
         let directional = match &plan.directional {
@@ -117,7 +133,7 @@ impl<'a> Cycles<'a> {
     ///
     /// Each one has a seed of its own. If the first two are equal bit for bit all the same, nothing
     /// depends on the seed, and the others need not be simulated.
-    fn repeat(&mut self, cycle: &Cycle, start_s: f64) -> Result<Repeated, String> {
+    fn repeat(&mut self, cycle: &Cycle, start_s: f64) -> Result<Repeated, CycleError> {
         let count = self.protocol.cycles;
         let mut repeated = Repeated {
             attained: Vec::new(),
@@ -166,7 +182,7 @@ impl<'a> Cycles<'a> {
         numbers: RangeInclusive<u32>,
         start_s: f64,
         repeated: &mut Repeated,
-    ) -> Result<(), String> {
+    ) -> Result<(), CycleError> {
         let first = *numbers.start();
         let setup = self.setup;
         let seeded = |number| Actuation {
@@ -212,15 +228,16 @@ impl<'a> Cycles<'a> {
             }
         };
         let done = run_motions(pool, engine, &jobs, settings, hooks, &mut ended);
-        let of_number = |index: usize, error: &EngineError| {
-            format!("cycle {}: {error}", first as usize + index)
+        let of_number = |index: usize, source: EngineError| CycleError::Cycle {
+            cycle: first as usize + index,
+            source,
         };
         match (done.error, failed) {
-            (Some(error), _) if done.identity.is_some() => Err(of_number(next, &error)),
+            (Some(error), _) if done.identity.is_some() => Err(of_number(next, error)),
             (Some(error), _) | (None, Some((_, error @ EngineError::NotMade { .. }))) => {
-                Err(error.to_string())
+                Err(error.into())
             }
-            (None, Some((index, error))) => Err(of_number(index, &error)),
+            (None, Some((index, error))) => Err(of_number(index, error)),
             (None, None) => {
                 if self.identity.is_none() {
                     self.identity = done.identity;

@@ -215,10 +215,10 @@ pub fn replay(
                     replays.insert(engine.name(), compared);
                     courses.push((engine.name(), course));
                 }
-                Err(message) if !control.is_cancelled() => failures.push(EngineFailure {
+                Err(error) if !control.is_cancelled() => failures.push(EngineFailure {
                     engine: engine.name().to_owned(),
                     during: Some("replay".to_owned()),
-                    message,
+                    message: error.to_string(),
                 }),
                 Err(_) => {}
             }

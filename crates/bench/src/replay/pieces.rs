@@ -34,7 +34,26 @@ struct Piece {
     load: usize,
 }
 
-/// What an engine does at every row of the log; a message for people if it cannot.
+/// Why an engine does not follow a log.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum CourseError {
+    /// It ended, or could not begin.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// It could not simulate a piece.
+    #[error("from {from_s:.2} s of the log: {source}")]
+    Piece {
+        /// Where the piece begins, s after the first row.
+        from_s: f64,
+        /// What it reports.
+        source: EngineError,
+    },
+    /// No two rows follow each other.
+    #[error("the log has no two consecutive rows without a gap")]
+    NoPiece,
+}
+
+/// What an engine does at every row of the log.
 pub(super) fn course(
     run: &RecordedRun,
     arm: &ReplayedArm,
@@ -42,7 +61,7 @@ pub(super) fn course(
     pool: &EnginePool,
     engine: &'static dyn Engine,
     control: &Control<'_>,
-) -> Result<(EngineIdentity, Course), String> {
+) -> Result<(EngineIdentity, Course), CourseError> {
     let target = run
         .target
         .as_ref()
@@ -104,16 +123,16 @@ pub(super) fn course(
         let done = run_motions(pool, engine, &jobs, settings, hooks, &mut ended);
         identity = identity.or(done.identity);
         if let Some(error) = done.error {
-            return Err(error.to_string());
+            return Err(error.into());
         }
     }
     match (failed, identity) {
-        (Some((row, error)), _) => Err(format!(
-            "from {:.2} s of the log: {error}",
-            run.time_s[row] - run.time_s[0]
-        )),
+        (Some((row, source)), _) => Err(CourseError::Piece {
+            from_s: run.time_s[row] - run.time_s[0],
+            source,
+        }),
         (None, Some(identity)) => Ok((identity, course)),
-        (None, None) => Err("the log has no two consecutive rows without a gap".to_owned()),
+        (None, None) => Err(CourseError::NoPiece),
     }
 }
 

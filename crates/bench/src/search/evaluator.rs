@@ -17,13 +17,13 @@ pub struct GenerationEvaluator<'a> {
 }
 
 impl CaseEvaluator for GenerationEvaluator<'_> {
-    fn worker(&self) -> Result<Box<dyn CaseWorker + '_>, String> {
-        Ok(Box::new(Worker {
+    fn worker(&self) -> Box<dyn CaseWorker + '_> {
+        Box::new(Worker {
             of: self,
             postures: StaticWorker::counting(counted_classes(&self.search.study))
                 .expecting_tip(self.search.expects_tip()),
             scan: LastScan::default(),
-        }))
+        })
     }
 }
 

@@ -82,7 +82,7 @@ fn margins_say_what_works_and_reach_knows_them_before() {
         .iter()
         .position(|each| each.name == MARGIN_COLUMN)
         .unwrap();
-    let mut worker = evaluator.worker().unwrap();
+    let mut worker = evaluator.worker();
     let reach = out_of_reach(&search, &generation, 2);
     let (mut ok, mut broken, mut out, mut most_mm) = (0, 0, 0, 0.0_f32);
     for (candidate, of_candidate) in reach.iter().enumerate() {

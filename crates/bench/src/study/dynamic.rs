@@ -20,6 +20,7 @@ use crate::progress::Silent;
 use crate::setup::Setup;
 use crate::simulate::{Detail, EngineRun, Simulation};
 
+use super::failure::CaseFailure;
 use super::planned::{case_report, case_setup, eight};
 use super::rows::{CaseRow, broken_rule};
 
@@ -76,7 +77,7 @@ pub fn dynamic_rows(
     resolved: &ResolvedScenario,
     engines: &[&'static dyn Engine],
     pool: &EnginePool,
-) -> Result<[CaseRow; 8], String> {
+) -> Result<[CaseRow; 8], CaseFailure> {
     Ok(dynamic_case(resolved, engines, pool)?.rows)
 }
 
@@ -88,7 +89,7 @@ pub fn dynamic_case(
     resolved: &ResolvedScenario,
     engines: &[&'static dyn Engine],
     pool: &EnginePool,
-) -> Result<DynamicCase, String> {
+) -> Result<DynamicCase, CaseFailure> {
     let started = Instant::now();
     let mut cost = CaseCost::default();
     let model = ClearanceModel::new(&resolved.cell);
@@ -107,7 +108,7 @@ pub fn dynamic_case(
         if let Err(error) = case.run_in(engine, pool, &control) {
             // The next case may find it well again.
             pool.discard(engine);
-            return Err(error.to_string());
+            return Err(error.into());
         }
         cost.engines.push((engine.name(), begun.elapsed()));
     }

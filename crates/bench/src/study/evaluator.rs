@@ -6,6 +6,7 @@ use needlebench_study::{CaseError, CaseEvaluator, CaseResult, CaseWorker, Design
 
 use super::case::StudyCase;
 use super::dynamic::dynamic_rows;
+use super::failure::CaseFailure;
 use super::margin::CountedClasses;
 use super::planned::planned_rows;
 use super::rows::StudyColumns;
@@ -31,15 +32,15 @@ impl<'a> StudyEvaluator<'a> {
 }
 
 impl CaseEvaluator for StudyEvaluator<'_> {
-    fn worker(&self) -> Result<Box<dyn CaseWorker + '_>, String> {
-        Ok(Box::new(Worker {
+    fn worker(&self) -> Box<dyn CaseWorker + '_> {
+        Box::new(Worker {
             study: self.study,
             design: self.design,
             columns: self.columns,
             postures: StaticWorker::counting(counted_classes(self.study)),
             pool: EnginePool::new(ENGINES),
             scan: LastScan::default(),
-        }))
+        })
     }
 }
 
@@ -62,6 +63,10 @@ struct Worker<'a> {
 
 impl CaseWorker for Worker<'_> {
     fn evaluate(&mut self, case: u64) -> Result<CaseResult, CaseError> {
+        let failed = |failure: CaseFailure| CaseError {
+            case,
+            message: failure.to_string(),
+        };
         let layout = StudyCase::new(self.study, self.design, case);
         let scenario = layout
             .scenario(self.study)
@@ -70,18 +75,16 @@ impl CaseWorker for Worker<'_> {
             Err(findings) => rows_without_scenario(&findings, layout.mode),
             Ok(resolved) => match layout.mode {
                 StudyMode::Static => self.postures.rows(&resolved),
-                StudyMode::Planned => {
-                    planned_rows(&resolved).map_err(|message| CaseError { case, message })?
-                }
+                StudyMode::Planned => planned_rows(&resolved).map_err(failed)?,
                 StudyMode::Dynamic => {
                     let named = layout
                         .engines
                         .as_ref()
                         .or(resolved.scenario.engines.run.as_ref());
                     choose_engines(ENGINES, named.map(Vec::as_slice))
-                        .map_err(|error| error.to_string())
+                        .map_err(CaseFailure::from)
                         .and_then(|engines| dynamic_rows(&resolved, &engines, &self.pool))
-                        .map_err(|message| CaseError { case, message })?
+                        .map_err(failed)?
                 }
             },
         };

@@ -4,6 +4,7 @@ mod assignment;
 mod case;
 mod dynamic;
 mod evaluator;
+mod failure;
 mod identity;
 mod launch;
 mod margin;
@@ -23,6 +24,7 @@ pub use case::StudyCase;
 pub use dynamic::{CaseCost, DynamicCase, ENGINE_FAILURE, dynamic_case, dynamic_rows};
 pub use evaluator::StudyEvaluator;
 pub(crate) use evaluator::counted_classes;
+pub use failure::CaseFailure;
 pub use identity::Identity;
 pub use launch::{
     Launch, LaunchFile, LaunchPlan, LaunchRequest, LaunchStep, Launcher, advice, launch_plan,

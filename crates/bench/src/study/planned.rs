@@ -19,21 +19,21 @@ use crate::events::EventRun;
 use crate::setup::Setup;
 use crate::simulate::EngineRun;
 
+use super::failure::CaseFailure;
 use super::rows::{CaseRow, broken_rule};
 
 /// Prepares a case of a scenario with one goal.
 pub(super) fn case_setup<'a>(
     resolved: &'a ResolvedScenario,
     model: &'a ClearanceModel,
-) -> Result<Setup<'a>, String> {
+) -> Result<Setup<'a>, CaseFailure> {
     if resolved.goals.len() != 1 || resolved.iso9283.is_some() || resolved.excitation.is_some() {
-        return Err(format!(
-            "a case has one goal, `{}` has {}",
-            resolved.source.file,
-            resolved.goals.len()
-        ));
+        return Err(CaseFailure::Goals {
+            file: resolved.source.file.clone(),
+            goals: resolved.goals.len(),
+        });
     }
-    Setup::new(resolved, model).map_err(|error| error.to_string())
+    Ok(Setup::new(resolved, model)?)
 }
 
 /// The report of the only goal, without what only pages and pictures show.
@@ -67,7 +67,7 @@ pub(super) fn case_report(
 ///
 /// # Errors
 /// If the scenario has not exactly one goal, or cannot be planned at all.
-pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[CaseRow; 8], String> {
+pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[CaseRow; 8], CaseFailure> {
     let model = ClearanceModel::new(&resolved.cell);
     let setup = case_setup(resolved, &model)?;
     let plan = setup.planner.plan(&resolved.goals[0]);

@@ -7,7 +7,8 @@ use needlebench_engine::ENGINES;
 use needlebench_input::Finding;
 use needlebench_scenario::study::{FactorValues, ResolvedStudy, StudyLevel, StudyMode};
 use needlebench_study::{
-    CaseEvaluator, Design, DesignError, FactorKind, Manifest, SCHEMA_VERSION, Shard, Status,
+    CaseError, CaseEvaluator, Design, DesignError, FactorKind, Manifest, SCHEMA_VERSION, Shard,
+    Status,
 };
 use serde_json::json;
 
@@ -276,20 +277,16 @@ const ESTIMATE_CASES: u64 = 16;
 ///
 /// # Errors
 /// What keeps cases from being computed at all.
-pub fn time_per_case(evaluator: &dyn CaseEvaluator, cases: u64) -> Result<Duration, String> {
-    let mut worker = evaluator.worker()?;
+pub fn time_per_case(evaluator: &dyn CaseEvaluator, cases: u64) -> Result<Duration, CaseError> {
+    let mut worker = evaluator.worker();
     let count = ESTIMATE_CASES.min(cases);
     // The first one also pays for what is made once.
-    worker.evaluate(0).map_err(|error| error.to_string())?;
+    worker.evaluate(0)?;
     let started = Instant::now();
     let mut done = 0;
     for k in 0..count {
-        worker
-            .evaluate(
-                u64::try_from(u128::from(cases) * u128::from(k) / u128::from(count))
-                    .expect("a case"),
-            )
-            .map_err(|error| error.to_string())?;
+        let case = u128::from(cases) * u128::from(k) / u128::from(count);
+        worker.evaluate(u64::try_from(case).expect("a case"))?;
         done += 1;
         if started.elapsed() > ESTIMATE {
             break;

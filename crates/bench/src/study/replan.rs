@@ -12,6 +12,7 @@ use needlebench_study::{Outcome, Results, ResultsError};
 use serde::Serialize;
 
 use super::case::StudyCase;
+use super::failure::CaseFailure;
 use super::planned::planned_rows;
 use super::prepare::PreparedStudy;
 use super::static_case::rows_without_scenario;
@@ -121,7 +122,7 @@ pub fn replanned(
     known: &BTreeMap<u64, u8>,
     control: ReplanControl<'_>,
     done: &(dyn Fn(u64, u8) + Sync),
-) -> Result<Option<Vec<ReplannedCase>>, String> {
+) -> Result<Option<Vec<ReplannedCase>>, CaseFailure> {
     let ReplanControl {
         threads,
         cancel,
@@ -143,7 +144,7 @@ pub fn replanned(
         progress.step();
         Ok(Some(ReplannedCase { planned, ..*each }))
     });
-    let planned: Result<Vec<Option<ReplannedCase>>, String> = planned.into_iter().collect();
+    let planned: Result<Vec<Option<ReplannedCase>>, CaseFailure> = planned.into_iter().collect();
     Ok(planned?.into_iter().collect())
 }
 
@@ -159,7 +160,11 @@ pub struct ReplanControl<'a> {
 }
 
 /// Configurations that are ok with their motions.
-fn planned_bits(prepared: &PreparedStudy, case: u64) -> Result<u8, String> {
+fn planned_bits(prepared: &PreparedStudy, case: u64) -> Result<u8, CaseFailure> {
+    let of_case = |source| CaseFailure::Replanned {
+        case,
+        source: Box::new(source),
+    };
     let layout = StudyCase::new(&prepared.study, &prepared.design, case);
     let resolved = layout.scenario(&prepared.study).and_then(|resolved| {
         scanned(
@@ -169,15 +174,12 @@ fn planned_bits(prepared: &PreparedStudy, case: u64) -> Result<u8, String> {
         )
     });
     let rows = match resolved {
-        Ok(resolved) => {
-            planned_rows(&resolved).map_err(|message| format!("case {case}: {message}"))?
-        }
+        Ok(resolved) => planned_rows(&resolved).map_err(of_case)?,
         Err(findings) if nothing_serves(&findings) => {
             rows_without_scenario(&findings, StudyMode::Planned)
         }
         Err(findings) => {
-            let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
-            return Err(format!("case {case}: {}", texts.join("; ")));
+            return Err(of_case(CaseFailure::Refused(findings)));
         }
     };
     let ok = rows.iter().enumerate();

@@ -672,7 +672,7 @@ pub fn plan_entry(
     with_goal.goals = vec![goal];
     with_goal.scenario.goals = vec![section];
     let rows = planned_rows(&with_goal)
-        .map_err(|message| SuggestError::refused(message, String::new()))?;
+        .map_err(|failure| SuggestError::refused(failure.to_string(), String::new()))?;
     let works = rows.iter().filter(|row| row.outcome == Outcome::Ok);
     entry.working_planned = Some(works.count());
     Ok(())

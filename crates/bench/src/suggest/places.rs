@@ -336,7 +336,7 @@ pub fn plan_place(family: &ScenarioFamily, place: &mut Place) -> Result<(), Sugg
     for goal in &place.goals {
         let resolved = at_place(family, &goal.goal, place)?;
         let rows = planned_rows(&resolved)
-            .map_err(|message| SuggestError::refused(message, String::new()))?;
+            .map_err(|failure| SuggestError::refused(failure.to_string(), String::new()))?;
         let works = rows.iter().filter(|row| row.outcome == Outcome::Ok);
         counts.push(works.count());
     }

@@ -272,7 +272,7 @@ fn scenario_of_several_goals_is_no_case() {
     );
     let whole = load_scenario(path.as_ref(), &Overrides::default()).unwrap();
     let message = planned_rows(&whole).unwrap_err();
-    assert!(message.contains("has 4"), "{message}");
+    assert!(message.to_string().contains("has 4"), "{message}");
 }
 
 /// The distances' own error: the two ways place the solids in different frames. Seen: 2e-11 m.

@@ -210,7 +210,7 @@ fn refuse_if_long(
     if cases <= FEW_CASES {
         return Ok(());
     }
-    let each = time_per_case(evaluator, prepared.design.cases()).map_err(anyhow::Error::msg)?;
+    let each = time_per_case(evaluator, prepared.design.cases()).map_err(anyhow::Error::from)?;
     let time = each.mul_f64(cases as f64 / threads as f64);
     if time <= WITHOUT_ASKING {
         return Ok(());
@@ -337,7 +337,7 @@ fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitSta
         return run_cases(arguments, prepared);
     }
     let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design, &prepared.columns);
-    let mut worker = evaluator.worker().map_err(anyhow::Error::msg)?;
+    let mut worker = evaluator.worker();
     let mut reports = Vec::new();
     for &number in &arguments.case {
         let layout = StudyCase::new(&prepared.study, &prepared.design, number);

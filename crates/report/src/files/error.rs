@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use needlebench_bench::study::CaseFailure;
 use needlebench_export::ExportError;
 use needlebench_study::ResultsError;
 
@@ -44,7 +45,7 @@ pub enum FilesError {
     Robustness(String),
     /// A static case of a study cannot be planned.
     #[error("planning a sample of cases: {0}")]
-    Replan(String),
+    Replan(CaseFailure),
     /// A recording cannot be exported.
     #[error(transparent)]
     Export(#[from] ExportError),

@@ -53,9 +53,9 @@ pub enum StudyError {
         total: u64,
         folder: PathBuf,
     },
-    /// A worker cannot start.
+    /// Memory for packing rows cannot be had.
     #[error("cannot start a worker: {0}")]
-    Worker(String),
+    Worker(std::io::Error),
     /// Another process writes to the folder.
     #[error(
         "{}: another process is writing here\nhint: wait for it or choose another folder",

@@ -107,7 +107,7 @@ impl Folder {
     fn salvage(&mut self) -> Result<(), StudyError> {
         let (key, manifest) = (Key::new(&self.manifest), self.manifest.clone());
         let table = self.path.join(RESULTS_FILE);
-        let mut packer = Packer::new().map_err(|error| StudyError::Worker(error.to_string()))?;
+        let mut packer = Packer::new().map_err(StudyError::Worker)?;
         let salvaged = sound_blocks(&table, &manifest, |block, columns| {
             let packed = packer.pack(columns)?;
             self.append(block, &key.record(block, columns.cases, &packed))

@@ -146,13 +146,10 @@ impl StudyRun<'_> {
                 let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
                 shared.fail(failure);
             };
-            let mut worker = match self.evaluator.worker() {
-                Ok(worker) => worker,
-                Err(message) => return failed(Failure::Worker(message)),
-            };
+            let mut worker = self.evaluator.worker();
             let mut packer = match Packer::new() {
                 Ok(packer) => packer,
-                Err(error) => return failed(Failure::Worker(error.to_string())),
+                Err(error) => return failed(Failure::Worker(error)),
             };
             let stopped = || stop.load(Ordering::Relaxed) || cancel.load(Ordering::Relaxed);
             while let Some(block) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
@@ -221,7 +218,7 @@ impl Shared<'_> {
 }
 
 enum Failure {
-    Worker(String),
+    Worker(std::io::Error),
     Write(std::io::Error),
     Case(CaseError),
 }
@@ -237,7 +234,7 @@ impl Failure {
 
     fn into_error(self, folder: &Folder, kept: u64) -> StudyError {
         match self {
-            Self::Worker(message) => StudyError::Worker(message),
+            Self::Worker(source) => StudyError::Worker(source),
             Self::Write(source) => folder.write_error(JOURNAL_FILE, source, kept),
             Self::Case(source) => StudyError::Case {
                 source,

@@ -161,7 +161,7 @@ fn advised(prepared: &PreparedStudy, request: LaunchRequest, cases: u64, jobs: u
     let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design, &prepared.columns);
     let mut lines = match time_per_case(&evaluator, cases) {
         Ok(each) => advice(request, cases, jobs, each),
-        Err(message) => vec![format!("time per shard unknown: {message}")],
+        Err(error) => vec![format!("time per shard unknown: {error}")],
     };
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let processes = u64::from(request.shards) * u64::from(jobs);

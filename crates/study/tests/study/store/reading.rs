@@ -53,7 +53,7 @@ fn what_is_read_is_what_was_computed() {
     assert_eq!(results.study_id(), "5eed");
     assert_eq!(results.study_name(), "synthetic");
     assert_eq!(results.provenance(), &design.manifest(64).provenance);
-    let mut worker = SyntheticEvaluator::FAST.worker().unwrap();
+    let mut worker = SyntheticEvaluator::FAST.worker();
     let mut next = 0;
     let mut visit = |values: &[_], found: &needlebench_study::CaseResult| {
         let expected = worker.evaluate(next).unwrap();

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use needlebench_study::{
-    CaseDesign, CaseEvaluator, CaseWorker, Factor, FactorKind, FactorValue, JOURNAL_FILE, Level,
-    MANIFEST_FILE, Manifest, RESULTS_FILE, RunEnd, Shard, StudyError, StudyRun,
+    CaseDesign, Factor, FactorKind, FactorValue, JOURNAL_FILE, Level, MANIFEST_FILE, Manifest,
+    RESULTS_FILE, RunEnd, Shard, StudyError, StudyRun,
 };
 
 use super::folder::Request;
@@ -172,26 +172,6 @@ fn a_garbled_manifest_and_one_of_the_future_are_refused() {
         let text = refused(&request, folder.path());
         assert!(text.starts_with(message), "{text}");
     }
-}
-
-struct NoEngine;
-
-impl CaseEvaluator for NoEngine {
-    fn worker(&self) -> Result<Box<dyn CaseWorker + '_>, String> {
-        Err("MuJoCo is not installed".to_owned())
-    }
-}
-
-#[test]
-fn workers_that_cannot_begin_say_why() {
-    let request = Request {
-        evaluator: &NoEngine,
-        ..Request::new(CASES, BLOCK)
-    };
-    assert_eq!(
-        refused(&request, tempfile::tempdir().unwrap().path()),
-        "cannot start a worker: MuJoCo is not installed"
-    );
 }
 
 struct Odd(Vec<Factor>);

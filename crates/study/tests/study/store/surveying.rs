@@ -111,9 +111,9 @@ struct Waiting<'a>(&'a Barrier);
 struct WaitingWorker<'a>(&'a Barrier, Box<dyn CaseWorker>);
 
 impl CaseEvaluator for Waiting<'_> {
-    fn worker(&self) -> Result<Box<dyn CaseWorker + '_>, String> {
-        let worker = SyntheticEvaluator::FAST.worker()?;
-        Ok(Box::new(WaitingWorker(self.0, worker)))
+    fn worker(&self) -> Box<dyn CaseWorker + '_> {
+        let worker = SyntheticEvaluator::FAST.worker();
+        Box::new(WaitingWorker(self.0, worker))
     }
 }
 

@@ -120,8 +120,8 @@ impl SyntheticEvaluator {
 }
 
 impl CaseEvaluator for SyntheticEvaluator {
-    fn worker(&self) -> Result<Box<dyn CaseWorker + '_>, String> {
-        Ok(Box::new(SyntheticWorker(self)))
+    fn worker(&self) -> Box<dyn CaseWorker + '_> {
+        Box::new(SyntheticWorker(self))
     }
 }
 
