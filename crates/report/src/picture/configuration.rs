@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Vector3};
-use needlebench_cell::{Rule, pair_in_words};
+use needlebench_cell::{Rule, pair_in_words, rule_in_words};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
 use needlebench_geometry::Visual;
 use needlebench_kinematics::{Joints, Pose};
@@ -222,12 +222,17 @@ pub(super) fn viewpoint(resolved: &ResolvedScenario, goal: &Goal) -> Vector3<f64
     level * -0.75 + forward * along + Vector3::new(0.0, 0.0, -0.55)
 }
 
-fn caption(report: &ConfigurationReport) -> String {
-    let mut lines = vec![report.label.to_owned()];
+/// What became of a configuration: `feasible`, `rejected: access zone blocked`, `failed`.
+pub(super) fn status_in_words(report: &ConfigurationReport) -> String {
     match (report.status, report.rejections.first()) {
-        (Status::Rejected, Some(first)) => lines.push(format!("rejected: {}", first.rule)),
-        (status, _) => lines.push(status.name().to_owned()),
+        (Status::Rejected, Some(first)) => format!("rejected: {}", rule_in_words(first.rule)),
+        (Status::Ok, _) => "feasible".to_owned(),
+        (status, _) => status.name().to_owned(),
     }
+}
+
+fn caption(report: &ConfigurationReport) -> String {
+    let mut lines = vec![report.label.to_owned(), status_in_words(report)];
     for (engine, measured) in &report.engines {
         let error_m = measured.needle.tip_position_error_m;
         lines.push(format!("{engine}: tip error {}", small_length(error_m)));
@@ -243,7 +248,7 @@ pub(crate) fn sheet_caption(goal: &GoalReport, report: &ConfigurationReport) -> 
         .is_some_and(|found| found.label == report.label);
     let mark = if chosen { " (recommended)" } else { "" };
     match report.rejections.first() {
-        Some(first) => format!("{}: {}", report.label, first.rule),
+        Some(first) => format!("{}: {}", report.label, rule_in_words(first.rule)),
         None => format!("{}{mark}", report.label),
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
+use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 use needlebench_evaluation::room::{RoomModel, RoomReport, SECTOR_RADIUS_M, sight_segments};
 use needlebench_geometry::{Shape, TriangleMesh};
 use needlebench_kinematics::{Joints, Pose};
@@ -13,7 +13,9 @@ use needlebench_render::{Anchor, Camera, Image, Label, Line3, Scene, SurfaceInst
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::people::Person;
 
-use super::configuration::{Backdrop, floor, posture_scene, sheet_caption, viewpoint};
+use super::configuration::{
+    Backdrop, floor, posture_scene, sheet_caption, status_in_words, viewpoint,
+};
 use super::voxels::voxel_surface;
 
 /// Size of one picture, pixels.
@@ -253,10 +255,7 @@ fn cone(half_angle_rad: f64, length_m: f64) -> TriangleMesh {
 }
 
 fn title(report: &ConfigurationReport, room: &RoomReport) -> String {
-    let status = match (report.status, report.rejections.first()) {
-        (Status::Rejected, Some(first)) => format!("rejected: {}", first.rule),
-        (status, _) => status.name().to_owned(),
-    };
+    let status = status_in_words(report);
     format!(
         "{}\n{status}\nelbow {} ({:+.0} mm)",
         report.label,
