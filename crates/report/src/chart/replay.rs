@@ -15,7 +15,7 @@ const LEFT_PX: f64 = 84.0;
 const TOP_PX: f64 = 106.0;
 const COLUMNS: usize = 3;
 const COLUMN_PX: f64 = 500.0;
-const LEGEND_ROW_PX: f64 = 244.0;
+const ROW_PX: f64 = 244.0;
 const PANEL_PX: [f64; 2] = [400.0, 180.0];
 
 /// Upright strips of a panel, each drawn by its lowest and highest value.
@@ -29,7 +29,7 @@ pub(crate) fn replay_chart(replay: &Replay) -> Chart {
     );
     let size = [
         LEFT_PX + COLUMNS as f64 * COLUMN_PX - 60.0,
-        TOP_PX + JOINT_COUNT as f64 * LEGEND_ROW_PX,
+        TOP_PX + JOINT_COUNT as f64 * ROW_PX,
     ];
     let mut chart = Chart::new(size, &*title);
     chart.write_large([20.0, 24.0], title);
@@ -118,7 +118,7 @@ fn row(chart: &mut Chart, replay: &Replay, overlay: Overlay, joint: usize) {
         let panel = Panel {
             corner: [
                 LEFT_PX + place as f64 * COLUMN_PX,
-                TOP_PX + joint as f64 * LEGEND_ROW_PX,
+                TOP_PX + joint as f64 * ROW_PX,
             ],
             size: PANEL_PX,
             title: format!("{}: {}", JOINT_LABELS[joint], column.what),

@@ -34,14 +34,14 @@ const COLUMN_PX: f64 = 450.0;
 const PANEL_PX: [f64; 2] = [350.0, 230.0];
 const LEFT_PX: f64 = 84.0;
 const TOP_PX: f64 = 122.0;
-const LEGEND_ROW_PX: f64 = 318.0;
+const ROW_PX: f64 = 318.0;
 
 /// The chart of one joint.
 pub(crate) fn servo_chart(report: &ServoReport, joint: &JointReport) -> Chart {
     let title = format!("{}: servo of {}", joint.joint, report.scenario);
     let size = [
         COLUMNS as f64 * COLUMN_PX + 16.0,
-        TOP_PX + 2.0 * LEGEND_ROW_PX - 20.0,
+        TOP_PX + 2.0 * ROW_PX - 20.0,
     ];
     let mut chart = Chart::new(size, &*title);
     let closed = &joint.closed_loop;
@@ -299,7 +299,7 @@ fn panel(column: usize, row: usize, title: &str, x: Axis, y: Axis) -> Panel {
     Panel {
         corner: [
             LEFT_PX + column as f64 * COLUMN_PX,
-            TOP_PX + row as f64 * LEGEND_ROW_PX,
+            TOP_PX + row as f64 * ROW_PX,
         ],
         size: PANEL_PX,
         title: title.to_owned(),
