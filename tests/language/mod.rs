@@ -5,7 +5,7 @@ mod texts;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use texts::{Text, in_code, in_data, in_python};
+use texts::{Text, in_code, in_data, in_markdown, in_python};
 
 /// Trimmed from the first and the last word of a phrase; `_`, `-` and backticks are part of words.
 const PUNCTUATION: [char; 11] = ['.', ',', ';', ':', '!', '?', '(', ')', '"', '\'', '*'];
@@ -91,14 +91,11 @@ fn texts_of(file: &str, content: &str) -> Vec<Text> {
     let is_source = file.contains("/src/") && file.starts_with("crates/");
     let is_test = stem.ends_with("tests") || file.contains("/tests/");
     match extension {
-        "md" if file == "README.md" || file.starts_with("guide/src/") => {
-            let whole = Text::new(1, content);
-            if stem == "glossary" {
-                Vec::new()
-            } else {
-                vec![whole]
-            }
+        // The changes name what was renamed.
+        "md" if !["glossary", "CHANGELOG"].contains(&stem) => {
+            vec![in_markdown(content)]
         }
+        "yml" | "yaml" => in_data(content, "description:"),
         "rs" if is_source && !is_test => in_code(content, &['"']),
         "js" if is_source && !stem.ends_with(".bundle") => in_code(content, &['"', '\'', '`']),
         "json" if stem.ends_with(".schema") => in_data(content, "\"description\":"),
@@ -129,8 +126,16 @@ fn texts_have_no_phrase_that_the_glossary_replaces() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let rules = rules(&fs::read_to_string(top.join("guide/src/glossary.md")).unwrap());
     assert!(rules.len() > 100, "{} phrases", rules.len());
-    let mut paths = vec![top.join("README.md")];
-    for folder in ["crates", "guide/src", "python/needlebench", "scenarios"] {
+    let tops = ["README", "ARCHITECTURE", "CONTRIBUTING", "SECURITY"];
+    let mut paths: Vec<PathBuf> = tops.map(|name| top.join(name).with_extension("md")).into();
+    for folder in [
+        ".github",
+        "crates",
+        "guide",
+        "models",
+        "python/needlebench",
+        "scenarios",
+    ] {
         files(&top.join(folder), &mut paths);
     }
     let mut found = Vec::new();
@@ -170,6 +175,22 @@ fn a_planted_phrase_is_found_where_users_read_it() {
     }
     assert_eq!(lines("crates/a/src/b.js", "f(`Can work ${b}`);").len(), 1);
     assert_eq!(lines("guide/src/a.md", "The *referee*.\n").len(), 1);
+    assert_eq!(
+        lines("crates/a/README.md", "```text\na: can work\n```\n").len(),
+        1
+    );
+    assert_eq!(
+        lines("guide/src/a.md", "```text\nreferee, b: c\n```\n").len(),
+        0
+    );
+    assert_eq!(
+        lines(
+            ".github/actions/a/action.yml",
+            "a:\n  description: can work\n"
+        )
+        .len(),
+        1
+    );
     assert_eq!(lines("scenarios/a.toml", "b = 1 # can work\n").len(), 1);
     assert_eq!(
         lines("python/needlebench/a.py", "\"\"\"Can work.\"\"\"\n").len(),

@@ -126,3 +126,21 @@ pub fn in_python(code: &str) -> Vec<Text> {
     }
     texts
 }
+
+/// All of it. In fenced blocks, which show what a program prints, names in front of a colon are columns and keys.
+pub fn in_markdown(text: &str) -> Text {
+    let mut is_block = false;
+    let lines = text.lines().map(|line| {
+        if line.trim_start().starts_with("```") {
+            is_block = !is_block;
+            return String::new();
+        }
+        if !is_block {
+            return line.to_owned();
+        }
+        let words = line.split_whitespace();
+        let words = words.skip_while(|word| word.ends_with([',', ':']));
+        words.collect::<Vec<_>>().join(" ")
+    });
+    Text::new(1, &lines.collect::<Vec<_>>().join("\n"))
+}
