@@ -233,9 +233,14 @@ pub(super) fn status_in_words(report: &ConfigurationReport) -> String {
 
 fn caption(report: &ConfigurationReport) -> String {
     let mut lines = vec![report.label.to_owned(), status_in_words(report)];
+    if let Some(budget) = &report.budget {
+        let rms_m = budget.total.at_target.analytic.rms_m;
+        lines.push(format!("RMS tip error {}", small_length(rms_m)));
+    }
     for (engine, measured) in &report.engines {
-        let error_m = measured.needle.tip_position_error_m;
-        lines.push(format!("{engine}: tip error {}", small_length(error_m)));
+        let residual_m = measured.needle.tip_position_error_m;
+        let residual = small_length(residual_m);
+        lines.push(format!("{engine}: simulation residual {residual}"));
     }
     lines.join("\n")
 }

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
+use needlebench_cell::part_in_words;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 use needlebench_evaluation::room::{RoomModel, RoomReport, SECTOR_RADIUS_M, sight_segments};
 use needlebench_geometry::{Shape, TriangleMesh};
@@ -278,7 +279,7 @@ fn numbers(room: &RoomReport) -> String {
     let blocker = room
         .hand_cone_blocker
         .as_ref()
-        .map_or(String::new(), |name| format!(" ({name})"));
+        .map_or(String::new(), |name| format!(" ({})", part_in_words(name)));
     lines.push(format!(
         "hand cone {:.0} deg{blocker}",
         room.hand_cone_half_angle_rad.to_degrees()
