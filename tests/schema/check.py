@@ -6,7 +6,7 @@
 Without probes, only whether the schemas are schemas and every shipped file fits.
 
 Each probe is a document at, inside or outside one limit that a schema states, with what the reader
-said of it. The validator (jsonschema) has to say the same, and every shipped file has to fit.
+said of it. The validator (jsonschema-rs) has to say the same, and every shipped file has to fit.
 """
 
 import json
@@ -17,7 +17,7 @@ from functools import cache
 from multiprocessing import Pool
 from pathlib import Path
 
-from jsonschema import Draft7Validator
+from jsonschema_rs import Draft7Validator, meta
 
 ROOT = Path(__file__).parents[2]
 SCHEMAS = {
@@ -58,7 +58,7 @@ def main() -> int:
     validators: dict[str, Draft7Validator] = {}
     for kind, file in SCHEMAS.items():
         schema = json.loads(file.read_text())
-        Draft7Validator.check_schema(schema)
+        meta.validate(schema)
         validators[kind] = Draft7Validator(schema)
     wrong: list[str] = []
     seen: Counter[tuple[str, bool]] = Counter()
@@ -78,7 +78,7 @@ def main() -> int:
         document = tomllib.loads(file.read_text())
         kind = "study" if "factors" in document else "scenario"
         wrong += [
-            f"{file.relative_to(ROOT)}: {error.json_path}: {error.message}"
+            f"{file.relative_to(ROOT)}: {'.'.join(map(str, error.instance_path))}: {error.message}"
             for error in validators[kind].iter_errors(document)
         ]
     print(f"{len(shipped)} shipped files")
