@@ -73,6 +73,11 @@ impl<'a> TomlText<'a> {
         slips::doubtful_units(&self.values)
     }
 
+    /// A note for each former name of a key or a choice.
+    pub fn former_names(&self, schema: &FileSchema) -> Vec<String> {
+        schema.former_names(&self.values)
+    }
+
     /// The whole file as a struct.
     ///
     /// # Errors
@@ -93,8 +98,8 @@ impl<'a> TomlText<'a> {
 
     fn misfit(&self, misfit: Misfit) -> Finding {
         let mut finding = self.finding(&misfit.key, misfit.message);
-        // What is unknown is the key, not its value.
-        if misfit.kind == MisfitKind::Unknown
+        // What is wrong is the key, not its value.
+        if matches!(misfit.kind, MisfitKind::Unknown | MisfitKind::Former)
             && let Some((key, _)) = self.place_of(&misfit.key)
         {
             finding = finding.at(self.text, key);

@@ -2,10 +2,9 @@
 
 use std::ffi::OsString;
 
-use crate::output::complain;
+use needlebench_input::schema::FORMER_NAMES_UNTIL;
 
-/// The version that no longer accepts former names.
-const ACCEPTED_UNTIL: &str = "0.2.0";
+use crate::output::complain;
 
 /// Commands, former and present name. Each is an `alias` in the command line.
 const COMMANDS: [(&str, &str); 2] = [("atlas", "roll-map"), ("record-plan", "plan-excitation")];
@@ -47,7 +46,7 @@ fn notes(arguments: &[OsString]) -> Vec<String> {
     commands
         .chain(options)
         .map(|(old, new)| {
-            format!("note: {old} is now {new}; the old name is accepted until {ACCEPTED_UNTIL}")
+            format!("note: {old} is now {new}; the old name is accepted until {FORMER_NAMES_UNTIL}")
         })
         .collect()
 }

@@ -4,9 +4,9 @@ use std::fmt;
 
 use toml::Value;
 
-use super::SWITCHED_OFF;
 use super::node::{Limits, List, Node, Table, Text};
 use super::unit::{in_words, quantity, unit_of, written};
+use super::{FORMER_NAMES_UNTIL, SWITCHED_OFF};
 use crate::nearest_name;
 
 /// One thing that does not fit.
@@ -27,6 +27,8 @@ pub struct Misfit {
 pub enum MisfitKind {
     /// A key that is not known.
     Unknown,
+    /// A former name of a key that is there too.
+    Former,
     /// A key that is not there; `key` names it.
     Missing,
     /// A value of another type, or none of those that there are.
@@ -260,7 +262,7 @@ impl<N: Limited> Limits<N> {
 impl Text {
     fn check(&self, at: Path<'_>, value: &str, found: &mut Vec<Misfit>) {
         let (message, hint) = if !self.one_of.is_empty() {
-            if self.one_of.iter().any(|each| each == value) {
+            if self.one_of.iter().any(|each| each == value) || self.former.contains_key(value) {
                 return;
             }
             let message = format!("`{value}` is not a valid value of `{at}`");
@@ -409,7 +411,7 @@ impl Table {
                 others => {
                     let known: Vec<&str> = match others {
                         Some((names, _)) => names.one_of.iter().map(String::as_str).collect(),
-                        None => self.keys.keys().map(String::as_str).collect(),
+                        None => self.present_names(),
                     };
                     let nearest = nearest_key(key, &known);
                     meant.extend(nearest);
@@ -420,6 +422,21 @@ impl Table {
                         hint: Some(unknown_key_hint(key, &known)),
                     });
                 }
+            }
+        }
+        for (old, key) in &self.former {
+            if values.contains_key(old) && values.contains_key(key) {
+                found.push(Misfit {
+                    key: Path::Key(&at, old).to_string(),
+                    kind: MisfitKind::Former,
+                    message: format!(
+                        "`{old}` is the former name of `{key}`, which stands here too"
+                    ),
+                    hint: Some(format!("remove `{old}`")),
+                });
+                meant.push(key);
+            } else if values.contains_key(old) {
+                meant.push(key);
             }
         }
         for (key, entry) in &self.keys {
@@ -434,6 +451,50 @@ impl Table {
             }
         }
     }
+}
+
+impl Node {
+    fn former_names(&self, at: Path<'_>, value: &Value, found: &mut Vec<String>) {
+        match (self, value) {
+            (Self::Table(table), Value::Table(values)) => table.former_names(at, values, found),
+            (Self::List(list), Value::Array(values)) => {
+                for (index, value) in values.iter().enumerate() {
+                    let item = list.item(index);
+                    item.former_names(Path::Index(&at, index), value, found);
+                }
+            }
+            (Self::Text(text), Value::String(value)) => {
+                if let Some(name) = text.former.get(value) {
+                    found.push(former_name(
+                        &format!("{at} = \"{value}\""),
+                        &format!("\"{name}\""),
+                    ));
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Table {
+    /// A note for each former name of a key or a choice.
+    pub(super) fn former_names(&self, at: Path<'_>, values: &toml::Table, found: &mut Vec<String>) {
+        for (key, value) in values {
+            let here = Path::Key(&at, key);
+            if let Some(name) = self.former.get(key) {
+                found.push(former_name(&here.to_string(), name));
+            }
+            let others = || self.others.as_deref().map(|(_, node)| node);
+            let node = self.keys.get(key).map(|entry| &entry.node).or_else(others);
+            if let Some(node) = node {
+                node.former_names(here, value, found);
+            }
+        }
+    }
+}
+
+fn former_name(old: &str, name: &str) -> String {
+    format!("`{old}` is now `{name}`; the old name is accepted until {FORMER_NAMES_UNTIL}")
 }
 
 /// The known key that an unknown one is most like.

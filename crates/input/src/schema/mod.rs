@@ -30,6 +30,11 @@ pub(crate) const HINT: &str = "x-hint";
 
 /// Whether a number may be switched off by the word "off".
 pub(crate) const OFF: &str = "x-off";
+/// The former name of a key or of a choice, which is accepted until [`FORMER_NAMES_UNTIL`].
+pub(crate) const FORMER: &str = "x-former";
+/// The version that no longer accepts former names of keys, choices, commands and options.
+pub const FORMER_NAMES_UNTIL: &str = "0.2.0";
+
 /// Word in place of a number that switches the value off.
 pub const SWITCHED_OFF: &str = "off";
 
@@ -87,6 +92,15 @@ impl FileSchema {
         found
     }
 
+    /// A note for each former name that a file uses: `search.fresh is now search.held_out_layouts; ...`.
+    pub fn former_names(&self, values: &toml::Table) -> Vec<String> {
+        let mut found = Vec::new();
+        if let Node::Table(table) = &self.node {
+            table.former_names(Path::Top, values, &mut found);
+        }
+        found
+    }
+
     /// Where a key belongs that stands where it is not known.
     fn place_of_key(&self, path: &str) -> Option<String> {
         /// More are no help.
@@ -112,6 +126,9 @@ impl Node {
         let Self::Table(table) = self else {
             return Err(format!("unknown key `{key}`; it takes no keys"));
         };
+        if let Some(name) = table.former.get(key) {
+            return Err(format!("`{key}` is now `{name}`"));
+        }
         if let Some(entry) = table.keys.get(key) {
             return Ok(&entry.node);
         }
@@ -123,7 +140,7 @@ impl Node {
                 }
                 names.one_of.iter().map(String::as_str).collect()
             }
-            None => table.keys.keys().map(String::as_str).collect::<Vec<_>>(),
+            None => table.present_names(),
         };
         let hint = unknown_key_hint(key, &names);
         Err(format!("unknown key `{key}`; {hint}"))

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use super::unit::{written, written_after};
-use super::{HINT, OFF, UNIT};
+use super::{FORMER, HINT, OFF, UNIT};
 
 /// What a value may be.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +45,8 @@ pub struct Limits<N> {
 pub struct Text {
     /// All that it may be, unless empty.
     pub one_of: Vec<String>,
+    /// Former names of those, and what they are now.
+    pub former: BTreeMap<String, String>,
     /// Characters that a name may have besides letters and digits; any text if there is none.
     pub name_with: Option<String>,
     /// Characters that it may have at most.
@@ -64,6 +66,8 @@ pub struct List {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
     pub keys: BTreeMap<String, Entry>,
+    /// Former names of keys, which are among the keys too, and what they are now.
+    pub former: BTreeMap<String, String>,
     /// What keys besides these may be, and have for a value; none if there is none.
     pub others: Option<Box<(Text, Node)>>,
 }
@@ -126,6 +130,7 @@ impl Node {
             }
             Some("string") => Self::Text(Text {
                 one_of: Vec::new(),
+                former: BTreeMap::new(),
                 name_with: here["pattern"].as_str().map(characters_of_names),
                 longest: here["maxLength"]
                     .as_u64()
@@ -248,6 +253,7 @@ impl Default for Text {
     fn default() -> Self {
         Self {
             one_of: Vec::new(),
+            former: BTreeMap::new(),
             name_with: None,
             longest: usize::MAX,
             hint: None,
@@ -266,11 +272,19 @@ impl Text {
                 .collect()
         };
         let choices = here["oneOf"].as_array().into_iter().flatten();
+        let choices = choices.filter(|each| each["deprecated"] != true);
         let mut one_of = listed(here);
-        one_of.extend(choices.flat_map(listed));
+        let mut former = BTreeMap::new();
+        for choice in choices {
+            if let (Some(old), Some(new)) = (choice[FORMER].as_str(), choice["const"].as_str()) {
+                former.insert(old.to_owned(), new.to_owned());
+            }
+            one_of.extend(listed(choice));
+        }
         assert!(!one_of.is_empty(), "no texts to choose from in {here}");
         Self {
             one_of,
+            former,
             name_with: None,
             longest: usize::MAX,
             hint: under.hint.map(str::to_owned),
@@ -298,6 +312,12 @@ impl Table {
             };
             (key.clone(), entry)
         });
+        let named = here["properties"].as_object().into_iter().flatten();
+        let former = named.filter_map(|(key, inner)| {
+            let old = inner[FORMER].as_str()?;
+            Some((old.to_owned(), key.clone()))
+        });
+        let former = former.collect();
         let others = match &here["additionalProperties"] {
             Value::Bool(false) => None,
             Value::Null => Some((Text::default(), Node::Anything)),
@@ -310,8 +330,17 @@ impl Table {
         };
         Self {
             keys: keys.collect(),
+            former,
             others: others.map(Box::new),
         }
+    }
+
+    /// The keys by the names that they have now.
+    pub(super) fn present_names(&self) -> Vec<&str> {
+        let names = self.keys.keys().map(String::as_str);
+        names
+            .filter(|key| !self.former.contains_key(*key))
+            .collect()
     }
 }
 

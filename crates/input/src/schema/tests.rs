@@ -26,6 +26,9 @@ struct File {
     points: Option<Vec<[f64; 2]>>,
     #[serde(default)]
     way: Option<Way>,
+    #[serde(default, alias = "spacing_mm")]
+    #[schemars(range(min = 1.0, max = 5.0), extend("x-former" = "spacing_mm"))]
+    step_mm: Option<f64>,
     #[serde(default)]
     inside: Option<Inside>,
     #[serde(default)]
@@ -38,6 +41,8 @@ enum Way {
     /// There.
     Out,
     /// And back.
+    #[serde(alias = "return")]
+    #[schemars(extend("x-former" = "return"))]
     Back,
 }
 
@@ -67,6 +72,44 @@ fn only(text: &str) -> (usize, String, String, String) {
         found.message,
         found.hint.unwrap_or_default(),
     )
+}
+
+#[test]
+fn former_names_are_read_with_a_note_each_and_not_beside_the_present_ones() {
+    let text = "name = \"a\"\nspacing_mm = 2\nway = \"return\"\n";
+    let file = read(text).unwrap();
+    assert_eq!((file.step_mm, file.way), (Some(2.0), Some(Way::Back)));
+    let schema = FileSchema::of::<File>();
+    assert_eq!(
+        TomlText::parse("f.toml", text)
+            .unwrap()
+            .former_names(&schema),
+        [
+            "`spacing_mm` is now `step_mm`; the old name is accepted until 0.2.0",
+            "`way = \"return\"` is now `\"back\"`; the old name is accepted until 0.2.0",
+        ]
+    );
+    let present = "name = \"a\"\nstep_mm = 2\nway = \"back\"\n";
+    let toml = TomlText::parse("f.toml", present).unwrap();
+    assert!(toml.former_names(&schema).is_empty());
+    assert_eq!(
+        only("name = \"a\"\nspacing_mm = 2\nstep_mm = 2\n"),
+        (
+            2,
+            "spacing_mm".to_owned(),
+            "`spacing_mm` is the former name of `step_mm`, which stands here too".to_owned(),
+            "remove `spacing_mm`".to_owned()
+        )
+    );
+    // Its limits are those of the key, and no hint proposes it.
+    assert_eq!(only("name = \"a\"\nspacing_mm = 9\n").1, "spacing_mm");
+    let (_, _, _, hint) = only("name = \"a\"\nspacin_mm = 2\n");
+    assert!(!hint.contains("spacing_mm"), "{hint}");
+    let (_, _, _, hint) = only("name = \"a\"\nway = \"retur\"\n");
+    assert!(!hint.contains("return"), "{hint}");
+    let properties = &schema.published()["properties"];
+    assert_eq!(properties["spacing_mm"]["deprecated"], true);
+    assert_eq!(properties["step_mm"]["deprecated"], Value::Null);
 }
 
 #[test]

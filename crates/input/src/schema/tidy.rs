@@ -3,11 +3,12 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{HINT, OFF, UNIT};
+use super::{FORMER, FORMER_NAMES_UNTIL, HINT, OFF, UNIT};
 
 /// Of everything in a schema.
 pub(super) fn tidy(schema: &mut Value) {
     each_object(schema, &mut |object| {
+        add_former_names(object);
         remove_null(object);
         if let Some(format) = object.remove("format") {
             let limits = match format.as_str() {
@@ -31,6 +32,7 @@ pub(super) fn without_own_words(schema: &mut Value) {
     each_object(schema, &mut |object| {
         object.remove(UNIT);
         object.remove(HINT);
+        object.remove(FORMER);
         if object.remove(OFF).is_some() {
             let words = ["type", "minimum", "exclusiveMinimum", "maximum"];
             let number: Map<String, Value> = words
@@ -40,6 +42,47 @@ pub(super) fn without_own_words(schema: &mut Value) {
             object.insert("anyOf".to_owned(), json!([number, { "enum": ["off"] }]));
         }
     });
+}
+
+/// Adds former names of keys and choices, and that none stands beside its present name.
+fn add_former_names(object: &mut Map<String, Value>) {
+    /// The same under its former name.
+    fn former(schema: &Value, present: &str) -> Option<(String, Value)> {
+        let name = schema.get(FORMER)?.as_str()?.to_owned();
+        let mut schema = schema.clone();
+        let words = schema.as_object_mut()?;
+        words.remove(FORMER);
+        words.remove("default");
+        let said = format!("Former name of `{present}`, accepted until {FORMER_NAMES_UNTIL}.");
+        words.insert("description".to_owned(), said.into());
+        words.insert("deprecated".to_owned(), true.into());
+        Some((name, schema))
+    }
+    if let Some(Value::Object(properties)) = object.get_mut("properties") {
+        let mut both = Vec::new();
+        let mut added = Vec::new();
+        for (key, schema) in &*properties {
+            if let Some((name, schema)) = former(schema, key) {
+                both.push(json!({ "required": [&name, key] }));
+                added.push((name, schema));
+            }
+        }
+        properties.extend(added);
+        if !both.is_empty() {
+            object.insert("not".to_owned(), json!({ "anyOf": both }));
+        }
+    }
+    if let Some(Value::Array(choices)) = object.get_mut("oneOf") {
+        let added: Vec<Value> = choices
+            .iter()
+            .filter_map(|schema| {
+                let (name, mut schema) = former(schema, schema.get("const")?.as_str()?)?;
+                schema["const"] = name.into();
+                Some(schema)
+            })
+            .collect();
+        choices.extend(added);
+    }
 }
 
 /// What may be left out may be null for serde, but there is no null in TOML.

@@ -95,6 +95,11 @@ fn only(schema: &Value) -> Option<&Value> {
     }
 }
 
+/// Whether it is no former name.
+fn is_present(schema: &Value) -> bool {
+    schema.get("deprecated").is_none()
+}
+
 fn alternatives(schema: &Value) -> Option<&Vec<Value>> {
     let found = schema.get("oneOf").or_else(|| schema.get("anyOf"));
     found.and_then(Value::as_array)
@@ -159,7 +164,7 @@ impl<'a> Reference<'a> {
             .unwrap_or_default();
         self.text
             .push_str("\n| Key | Value | Meaning |\n|---|---|---|\n");
-        for (key, property) in properties {
+        for (key, property) in properties.iter().filter(|(_, each)| is_present(each)) {
             let mut value = self.value(section, key, property);
             if required.contains(&key.as_str()) {
                 value.push_str("; **required**");
@@ -190,6 +195,7 @@ impl<'a> Reference<'a> {
         if let Some(all) = alternatives(inner) {
             let all: Vec<String> = all
                 .iter()
+                .filter(|each| is_present(each))
                 .map(|each| self.value(section, key, each))
                 .collect();
             return all.join(" or ");
@@ -264,7 +270,8 @@ impl<'a> Reference<'a> {
         let (inner, _) = self.resolve(schema);
         let own = words(schema);
         let mut text = if own.is_empty() { words(inner) } else { own };
-        for each in alternatives(inner).into_iter().flatten() {
+        let all = alternatives(inner).into_iter().flatten();
+        for each in all.filter(|each| is_present(each)) {
             if let (Some(word), said) = (each.get("const"), words(each))
                 && !said.is_empty()
             {

@@ -27,6 +27,8 @@ struct Trial {
     /// None: the key is taken away.
     value: Option<Value>,
     fits: bool,
+    /// Not together with others: a former name may stand beside its present one.
+    alone: bool,
 }
 
 /// One probe for every limit, choice, length, type and key, and documents of several numbers at once.
@@ -40,7 +42,7 @@ pub fn probes(schema: &Schema) -> Vec<Probe> {
         .collect();
     let numbers: Vec<&Trial> = trials
         .iter()
-        .filter(|trial| matches!(trial.value, Some(Value::Float(_))))
+        .filter(|trial| matches!(trial.value, Some(Value::Float(_))) && !trial.alone)
         .collect();
     for round in 0..SEVERAL {
         let picked: Vec<Trial> = (0..4)
@@ -186,6 +188,7 @@ impl Root<'_> {
                 steps: steps.clone(),
                 value: Some(value),
                 fits,
+                alone: false,
             });
         };
         if here.as_bool() == Some(true) {
@@ -284,6 +287,7 @@ impl Root<'_> {
                 steps: steps.clone(),
                 value: Some(list(count)),
                 fits,
+                alone: false,
             });
         };
         add(least, true);
@@ -308,7 +312,12 @@ impl Root<'_> {
         let mut at = |name: &str, value: Option<Value>, fits: bool| {
             let mut steps = steps.clone();
             steps.push(Step::Key(name.to_owned()));
-            trials.push(Trial { steps, value, fits });
+            trials.push(Trial {
+                steps,
+                value,
+                fits,
+                alone: false,
+            });
         };
         if here["additionalProperties"] == false {
             at("no_such_key", Some(1.into()), false);
@@ -324,11 +333,18 @@ impl Root<'_> {
                 steps: steps.clone(),
                 value: Some(1.into()),
                 fits: false,
+                alone: false,
             });
         }
         for (name, inner) in here["properties"].as_object().into_iter().flatten() {
             steps.push(Step::Key(name.clone()));
+            let first = trials.len();
             self.visit(inner, steps, trials);
+            if inner["deprecated"] == true {
+                trials[first..]
+                    .iter_mut()
+                    .for_each(|trial| trial.alone = true);
+            }
             steps.pop();
         }
         for name in texts(&here["propertyNames"]) {
