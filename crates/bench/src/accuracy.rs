@@ -452,7 +452,7 @@ fn notes_of_study(prepared: &PreparedStudy, needles: Needles) -> Vec<String> {
         );
     }
     let choices = prepared.design.factors().iter();
-    let choices = choices.filter(|each| each.role == needlebench_study::Role::Choice);
+    let choices = choices.filter(|each| each.role == needlebench_study::Role::Control);
     let names: Vec<&str> = choices.map(|each| each.name.as_str()).collect();
     if !names.is_empty() {
         notes.push(format!(

@@ -263,7 +263,7 @@ pub(crate) fn goal_factor(goals: &[String]) -> Factor {
     Factor {
         name: "goal".to_owned(),
         unit: String::new(),
-        role: Role::Circumstance,
+        role: Role::Noise,
         sampled: false,
         kind: FactorKind::Levels(goals.iter().map(level).collect()),
     }

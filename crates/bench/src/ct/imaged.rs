@@ -50,7 +50,7 @@ impl LastScan {
 /// All that a scan depends on, and what is pointed to in it.
 fn key(resolved: &ResolvedScenario, section: &CtSection) -> String {
     let scan = CtSection {
-        touch_mm: 0.0,
+        fle_sd_mm: 0.0,
         markers: None,
         ..section.clone()
     };
@@ -280,7 +280,7 @@ fn wanted(
         .hint("`markers = \"ct_sphere\"` under [phantom]")));
     };
     let robot_from_ct = scan.robot_from_ct.unwrap_or_else(Pose::identity);
-    let touch_m = 1e-3 * section.touch_mm;
+    let touch_m = 1e-3 * section.fle_sd_mm;
     let mut markers = Vec::new();
     for marker in &scan.truth.markers {
         // Drawn for all of them, so that a set of fewer has the same ones.

@@ -96,7 +96,7 @@ pub(super) fn checks(
             check(key, engine, value, limit, "s", "", missing);
         }
     }
-    if events.retract {
+    if events.retreat {
         for &engine in engines {
             let limit = events.max_retraction_deviation_mm.map(|mm| mm * 1e-3);
             let key = "events.max_retraction_deviation_mm".to_owned();

@@ -78,7 +78,7 @@ pub(crate) fn simulate(
             });
         }
         let retreat = run.job().plan(plans).retreat.as_ref();
-        if let Some(retreat) = retreat.filter(|_| section(setup.resolved).retract) {
+        if let Some(retreat) = retreat.filter(|_| section(setup.resolved).retreat) {
             parts.push((at, Part::Retract));
             jobs.push(setup.job(retreat));
         }

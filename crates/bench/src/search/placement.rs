@@ -31,9 +31,9 @@ pub fn placement(search: &PreparedSearch, id: usize, log: &SearchLog) -> Option<
     let mut chosen = search.candidate_of(choice)?.into_iter();
     for factor in &study.factors {
         let value = match factor.role {
-            Role::Choice => chosen.next(),
+            Role::Control => chosen.next(),
             // What all layouts have in common.
-            Role::Circumstance => match &factor.values {
+            Role::Noise => match &factor.values {
                 FactorValues::Levels(levels) if levels.len() == 1 => Some(FactorValue::Level(0)),
                 _ => None,
             },

@@ -78,12 +78,12 @@ impl PreparedSearch {
         }
         let space = SearchSpace::new(&study, samples)
             .map_err(|error| vec![space_finding(&study, &error)])?;
-        let named = |name| Objective::named(name, section.quantile, section.failure_counts_mm);
+        let named = |name| Objective::named(name, section.quantile, section.failure_penalty_mm);
         let mut plan = SearchPlan {
             objective: named(section.objective),
             second: section.second_objective.map(named),
             samples,
-            fresh: section.fresh,
+            fresh: section.held_out_layouts,
             budget: 0,
             seed: study.file.seed,
         };
@@ -125,7 +125,7 @@ impl PreparedSearch {
     /// The control factors.
     pub fn choices(&self) -> impl Iterator<Item = &Factor> {
         let factors = self.space.factors().iter();
-        factors.filter(|factor| factor.role == Role::Choice)
+        factors.filter(|factor| factor.role == Role::Control)
     }
 
     /// The candidate of a description in the log; none where it is of no factor's values.
@@ -231,7 +231,7 @@ fn space_finding(study: &ResolvedStudy, error: &SpaceError) -> Finding {
     let finding = Finding::new(&study.source.file, error.to_string()).key("factors");
     match error {
         SpaceError::NoChoice => finding.hint(
-            "give `role = \"choice\"` to factors that you control, such as the base placement",
+            "give `role = \"control\"` to factors that you control, such as the base placement",
         ),
         SpaceError::NoCircumstance => finding.hint(
             "add a factor that you do not control, such as `key = \"phantom.position_mm[0]\"`, \
@@ -264,7 +264,7 @@ fn plan_finding<S>(study: &ResolvedStudy, error: &SearchError<S>) -> Finding {
     let finding = Finding::new(&study.source.file, message);
     match error {
         SearchError::Budget { least, .. } => finding.key("search.budget").hint(format!(
-            "set `budget = {least}`, or use fewer `samples` or `fresh` (held-out) layouts under [search]"
+            "set `budget = {least}`, or use fewer `samples` or `held_out_layouts` under [search]"
         )),
         _ => finding
             .key("factors")

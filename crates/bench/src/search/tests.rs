@@ -29,12 +29,12 @@ samples = 16
 [[factors]]
 name = "x"
 key = "robot.base_position_mm[0]"
-role = "choice"
+role = "control"
 values = [-900, -480, -280, 200]
 [[factors]]
 name = "z"
 key = "robot.base_position_mm[2]"
-role = "choice"
+role = "control"
 values = [1050, 1500]
 [[factors]]
 name = "size"
@@ -147,7 +147,7 @@ fn what_nothing_can_be_chosen_from_says_what_is_missing() {
     assert!(
         findings[0]
             .message
-            .contains("no factor has `role = \"choice\"`"),
+            .contains("no factor has `role = \"control\"`"),
         "{findings:?}"
     );
     assert!(findings[0].hint.as_ref().unwrap().contains("role"));

@@ -334,7 +334,7 @@ fn sobol_points_of_a_ball(radius: f64) -> Vec<[f64; 3]> {
     let factor = |name: &str| StudyFactor {
         name: name.to_owned(),
         unit: "mm".to_owned(),
-        role: Role::Circumstance,
+        role: Role::Noise,
         sampled: true,
         values: FactorValues::Continuum {
             key: key("phantom.position_mm[0]"),

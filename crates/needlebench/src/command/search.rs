@@ -25,11 +25,11 @@ use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
-use crate::output::shown;
+use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 
 pub(crate) const SEARCH_HELP: &str = "\
-Control factors (`role = \"choice\"`) are optimised; noise factors define the layouts that every candidate is evaluated \
+Control factors (`role = \"control\"`) are optimised; noise factors define the layouts that every candidate is evaluated \
 on. [search] in the study file selects the objective: a lower quantile of the constraint margin, the share of feasible layouts, or \
 the RMS tip error.
 
@@ -79,7 +79,11 @@ pub(crate) struct SearchArguments {
 /// Optimises the control factors of a study.
 pub(crate) fn search(arguments: &SearchArguments) -> Result<ExitStatus, Failure> {
     let overrides = overrides(&arguments.robot)?;
-    let prepared = PreparedSearch::new(load_study(&arguments.study, &overrides)?)?;
+    let study = load_study(&arguments.study, &overrides)?;
+    for note in &study.notes {
+        complain(&format!("note: {note}"));
+    }
+    let prepared = PreparedSearch::new(study)?;
     let folder = arguments.out.join(&prepared.study.file.name);
     prepare_folder(&folder)?;
     let generations = folder.join(GENERATIONS);

@@ -113,7 +113,7 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus, Failure> {
 fn choice_with_range(prepared: &PreparedStudy) -> Option<String> {
     let mut factors = prepared.design.factors().iter();
     let factor = factors.find(|factor| {
-        factor.role == Role::Choice && matches!(factor.kind, FactorKind::Continuous { .. })
+        factor.role == Role::Control && matches!(factor.kind, FactorKind::Continuous { .. })
     })?;
     Some(format!(
         "note: control factor `{}` has a range: a study compares bins of it, under different noise factors\n\
@@ -183,7 +183,11 @@ fn variable(name: &str) -> Option<String> {
 /// Reads a study.
 fn prepare(path: &Path, robot: &RobotArguments) -> Result<PreparedStudy, Failure> {
     let overrides = overrides(robot)?;
-    Ok(PreparedStudy::new(load_study(path, &overrides)?)?)
+    let study = load_study(path, &overrides)?;
+    for note in &study.notes {
+        complain(&format!("note: {note}"));
+    }
+    Ok(PreparedStudy::new(study)?)
 }
 
 fn prepare_outputs(

@@ -23,7 +23,7 @@ relative = true
 [[factors]]
 name = "height"
 key = "robot.base_position_mm[2]"
-role = "choice"
+role = "control"
 values = [790, 800]
 "#;
 

@@ -13,7 +13,7 @@ seed = 1
 [sampling]
 samples = 16
 [search]
-fresh = 16
+held_out_layouts = 16
 budget = 112
 [[factors]]
 name = "along"
@@ -23,12 +23,12 @@ relative = true
 [[factors]]
 name = "height"
 key = "robot.base_position_mm[2]"
-role = "choice"
+role = "control"
 values = [790, 800, 810]
 [[factors]]
 name = "tool"
 key = "tool.mount_rotation_deg"
-role = "choice"
+role = "control"
 values = [90, 180]
 "#;
 
@@ -133,7 +133,10 @@ fn a_study_of_a_choice_with_a_range_names_the_search() {
 
 #[test]
 fn the_error_of_the_tip_is_that_of_real_arms() {
-    let by_error = STUDY.replace("fresh = 16", "fresh = 16\nobjective = \"tip_error\"");
+    let by_error = STUDY.replace(
+        "held_out_layouts = 16",
+        "held_out_layouts = 16\nobjective = \"tip_error\"",
+    );
     let bench = Bench::with_study(&by_error);
     let document = run(&bench, "--json").exits_with(0).json();
     let error_mm = document["answer"]["figures"][0]["value"].number();

@@ -24,7 +24,7 @@ relative = true
 [[factors]]
 name = "height"
 key = "robot.base_position_mm[2]"
-role = "choice"
+role = "control"
 values = [790, 800, 810]
 [[factors]]
 name = "tool"
@@ -185,7 +185,7 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
 
 #[test]
 fn named_levels_are_held_against_each_other_where_nothing_is_to_be_chosen() {
-    let study = STUDY.replace("role = \"choice\"\n", "").replace(
+    let study = STUDY.replace("role = \"control\"\n", "").replace(
         "key = \"tool.mount_rotation_deg\"\nvalues = [90, 180]",
         "[[factors.levels]]\nname = \"plain\"\n[[factors.levels]]\nname = \"wide berth\"\nset = { \"planning.min_clearance_mm\" = 60 }",
     );

@@ -44,7 +44,7 @@ pub(crate) fn search_page(
                 .file
                 .factors
                 .iter()
-                .filter(|each| each.role == Role::Choice),
+                .filter(|each| each.role == Role::Control),
         )
         .map(|((factor, axis), section)| {
             let (levels, range) = match (axis, &factor.kind) {

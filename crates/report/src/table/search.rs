@@ -178,7 +178,7 @@ fn sentences(search: &PreparedSearch, log: &SearchLog) -> Vec<String> {
         .file
         .factors
         .iter()
-        .filter(|factor| factor.role == Role::Choice)
+        .filter(|factor| factor.role == Role::Control)
         .zip(&winner.choice)
         .filter_map(|(factor, (_, value))| {
             let key = factor.key.as_ref()?;

@@ -246,7 +246,8 @@ impl<'a> Draft<'a> {
     ) -> Result<Self, Vec<Finding>> {
         let mut scenario: Scenario = toml.read(&scenario::FILE)?;
         let library = ModelLibrary::default();
-        let mut remarks = toml.doubts();
+        let mut remarks = toml.former_names(&scenario::FILE);
+        remarks.extend(toml.doubts());
         assume(toml, &mut scenario, base, overrides, &library, &mut remarks);
         Ok(Self {
             toml,

@@ -66,8 +66,9 @@ pub struct CtSection {
     pub markers: Option<Vec<String>>,
     /// Standard deviation per axis of the marker positions digitised with the robot, mm. Assumed: the marker's centre
     /// is digitised with the needle tip.
-    #[schemars(range(min = 0.001, max = 10.0))]
-    pub touch_mm: f64,
+    #[serde(alias = "touch_mm")]
+    #[schemars(range(min = 0.001, max = 10.0), extend("x-former" = "touch_mm"))]
+    pub fle_sd_mm: f64,
     /// Standard deviation per axis of the seed point that a reader sets in a lesion for segmentation, mm. Assumed.
     #[schemars(range(min = 0.0, max = 5.0))]
     pub click_mm: f64,
@@ -88,7 +89,7 @@ impl Default for CtSection {
             tilt_deg: 0.0,
             vessels_hu: 45.0,
             markers: None,
-            touch_mm: 0.3,
+            fle_sd_mm: 0.3,
             click_mm: 1.0,
             shift_mm: [0.0; 3],
         }

@@ -12,7 +12,9 @@ use super::Scenario;
 #[serde(deny_unknown_fields, default)]
 pub struct EventsSection {
     /// Simulates the retreat too: linearly along the needle axis, then to the start posture.
-    pub retract: bool,
+    #[serde(alias = "retract")]
+    #[schemars(extend("x-former" = "retract"))]
+    pub retreat: bool,
     /// Maximum distance of the guide from the needle axis while the needle is inserted, mm. Default: not evaluated.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub max_retraction_deviation_mm: Option<f64>,

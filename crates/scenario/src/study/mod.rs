@@ -165,10 +165,14 @@ pub struct SamplingSection {
 #[serde(rename_all = "snake_case")]
 pub enum Role {
     /// A control factor, such as base placement or tool: the study finds its best level.
-    Choice,
+    #[serde(alias = "choice")]
+    #[schemars(extend("x-former" = "choice"))]
+    Control,
     /// A noise factor, such as patient position or a draw: a candidate must be feasible over its values.
     #[default]
-    Circumstance,
+    #[serde(alias = "circumstance")]
+    #[schemars(extend("x-former" = "circumstance"))]
+    Noise,
 }
 
 /// One factor: exactly one of `values`, `grid`, `range`, `normal` and `levels`.
@@ -182,7 +186,7 @@ pub struct FactorSection {
     /// where `goal` is the goal of the case. Not used with `levels`.
     #[serde(default)]
     pub key: Option<String>,
-    /// `choice` for a control factor, `circumstance` for a noise factor.
+    /// `control` for a control factor, `noise` for a noise factor.
     #[serde(default)]
     pub role: Role,
     /// Adds to the scenario's value instead of replacing it.
@@ -354,6 +358,8 @@ pub struct ResolvedStudy {
     pub factors: Vec<StudyFactor>,
     /// Evaluation of a case, unless a level overrides it.
     pub mode: StudyMode,
+    /// Notes on the study file, for standard error.
+    pub notes: Vec<String>,
 }
 
 /// Reads and checks a study file and the scenario that it varies.

@@ -69,6 +69,7 @@ pub(super) fn resolve(
         goals,
         factors,
         file: study,
+        notes: toml.former_names(&FILE),
     })
 }
 
@@ -130,12 +131,12 @@ fn check_search(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Findi
     if !study
         .factors
         .iter()
-        .any(|factor| factor.role == Role::Choice)
+        .any(|factor| factor.role == Role::Control)
     {
         findings.push(
             toml.finding(
                 "search",
-                "no factor has `role = \"choice\"`: a search needs control factors",
+                "no factor has `role = \"control\"`: a search needs control factors",
             )
             .hint("set it for control factors, such as the base placement"),
         );

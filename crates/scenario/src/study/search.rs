@@ -29,7 +29,7 @@ impl ObjectiveName {
     }
 }
 
-/// Optimisation by `needlebench search` over the control factors (`role = "choice"`). Cases are static; layouts are
+/// Optimisation by `needlebench search` over the control factors (`role = "control"`). Cases are static; layouts are
 /// sampled from all other factors, goals included.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -50,15 +50,17 @@ pub struct SearchSection {
     #[schemars(range(min = 16, max = 1_000_000))]
     pub samples: Option<u64>,
     /// Number of held-out layouts, not used for selection, on which the winner is evaluated.
-    #[schemars(range(min = 16, max = 1_000_000))]
-    pub fresh: u64,
+    #[serde(alias = "fresh")]
+    #[schemars(range(min = 16, max = 1_000_000), extend("x-former" = "fresh"))]
+    pub held_out_layouts: u64,
     /// Maximum number of cases. Default: a third of an exhaustive evaluation of all candidates on all layouts, or 6144
     /// if control factors have ranges; at least the minimum that suffices.
     #[schemars(range(min = 1, max = 1_000_000_000))]
     pub budget: Option<u64>,
     /// Failure penalty: tip error assigned to a layout without a feasible configuration in `tip_error`, mm.
-    #[schemars(range(max = 1000.0), extend("exclusiveMinimum" = 0.0))]
-    pub failure_counts_mm: f64,
+    #[serde(alias = "failure_counts_mm")]
+    #[schemars(range(max = 1000.0), extend("exclusiveMinimum" = 0.0, "x-former" = "failure_counts_mm"))]
+    pub failure_penalty_mm: f64,
 }
 
 impl Default for SearchSection {
@@ -69,9 +71,9 @@ impl Default for SearchSection {
             classes: None,
             quantile: 0.05,
             samples: None,
-            fresh: 256,
+            held_out_layouts: 256,
             budget: None,
-            failure_counts_mm: 10.0,
+            failure_penalty_mm: 10.0,
         }
     }
 }

@@ -37,11 +37,33 @@ fn finding(lines: &str) -> Finding {
 const SHIFT: &str = "[[factors]]\nname = \"shift\"\nkey = \"phantom.position_mm[0]\"\n";
 
 #[test]
+fn former_names_are_read_as_the_present_ones() {
+    let present = "[search]\nheld_out_layouts = 64\nfailure_penalty_mm = 7.5\n\
+                   [[factors]]\nname = \"tool\"\nkey = \"tool.urdf\"\nrole = \"control\"\n\
+                   values = [\"offset\", \"inline\"]\n\
+                   [[factors]]\nname = \"s\"\nkey = \"seed\"\nrole = \"noise\"\nvalues = [1, 2]\n";
+    let former = present
+        .replace("held_out_layouts", "fresh")
+        .replace("failure_penalty_mm", "failure_counts_mm")
+        .replace("control", "choice")
+        .replace("noise", "circumstance");
+    let [present, former] = [present, &former].map(|lines| load(lines).unwrap());
+    assert_eq!(present.file.search, former.file.search);
+    assert_eq!(present.file.search.unwrap().held_out_layouts, 64);
+    let roles = |factors: &[needlebench_scenario::study::StudyFactor]| {
+        factors.iter().map(|each| each.role).collect::<Vec<_>>()
+    };
+    assert_eq!(roles(&present.factors), roles(&former.factors));
+    assert_eq!(present.notes.len(), 0);
+    assert_eq!(former.notes.len(), 4, "{:?}", former.notes);
+}
+
+#[test]
 fn a_study_knows_its_factors() {
     let study = load(
         "mode = \"static\"\ngoals = [\"left_upper_anterior\"]\n[sampling]\nsamples = 8\n\
          [[factors]]\nname = \"x\"\nkey = \"phantom.position_mm[0]\"\nrange = [-30, 30]\nrelative = true\n\
-         [[factors]]\nname = \"tool\"\nkey = \"tool.urdf\"\nrole = \"choice\"\nvalues = [\"offset\", \"inline\"]\n\
+         [[factors]]\nname = \"tool\"\nkey = \"tool.urdf\"\nrole = \"control\"\nvalues = [\"offset\", \"inline\"]\n\
          [[factors]]\nname = \"z\"\nkey = \"robot.base_position_mm[2]\"\ngrid = { from = 900, to = 1100, steps = 5 }\n\
          [[factors]]\nname = \"arm\"\n\
          [[factors.levels]]\nname = \"rigid\"\n\

@@ -7,7 +7,7 @@ use crate::{FactorValue, Outcome, Role, Row};
 fn study(seed: u64, cases: u64, shift: f64, error: f64, unlucky: u64) -> Synthetic {
     Synthetic {
         columns: columns().to_vec(),
-        factors: vec![goal(), continuous("x", Role::Circumstance, 0.0, 1.0)],
+        factors: vec![goal(), continuous("x", Role::Noise, 0.0, 1.0)],
         cases,
         case: Box::new(move |case| {
             let x = uniform(seed, case, 0);

@@ -1,6 +1,6 @@
 //! Optimisation of a study's control factors.
 //!
-//! A *candidate* is a value of each control factor (`role = "choice"`); a *circumstance* is a sampled point of the
+//! A *candidate* is a value of each control factor (`role = "control"`); a *circumstance* is a sampled point of the
 //! noise factors, goals included, the same one for all candidates (common random points), so that the common effect
 //! of a difficult layout cancels in their differences. A [`Judge`] evaluates the cases, generation by generation; this
 //! module knows neither robots nor files, and its requests depend on the seed and the answers alone.

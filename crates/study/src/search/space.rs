@@ -19,7 +19,7 @@ const FRESH: u64 = 0x2545_f491_4f6c_dd1d;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SpaceError {
     /// No control factor.
-    #[error("no control factor: no factor has `role = \"choice\"`")]
+    #[error("no control factor: no factor has `role = \"control\"`")]
     NoChoice,
     /// No noise factor.
     #[error("no noise factor: all factors are control factors, and there is one goal")]
@@ -109,7 +109,7 @@ impl SearchSpace {
             ..goal
         }];
         all.extend(factors.iter().map(|factor| Factor {
-            sampled: factor.role == Role::Circumstance,
+            sampled: factor.role == Role::Noise,
             ..described(factor, true)
         }));
         let mut next = 0;
@@ -126,7 +126,7 @@ impl SearchSpace {
         };
         let circumstances = all
             .iter()
-            .filter(|factor| factor.role == Role::Circumstance && varies(factor))
+            .filter(|factor| factor.role == Role::Noise && varies(factor))
             .count();
         let most = most_dimensions(method);
         if circumstances > most {
@@ -144,7 +144,7 @@ impl SearchSpace {
                 FactorValues::Continuum { distribution, .. } => Some(distribution),
                 FactorValues::Levels(_) => None,
             });
-            if factor.role == Role::Choice {
+            if factor.role == Role::Control {
                 axes.push(match (&factor.kind, distribution) {
                     (_, Some(Distribution::Uniform { low, high })) => {
                         ChoiceAxis::Range { low, high }
@@ -253,7 +253,10 @@ impl SearchSpace {
 
     /// Values of the control factors by name: labels of levels, numbers.
     pub fn describe(&self, candidate: &[FactorValue]) -> Vec<(String, serde_json::Value)> {
-        let chosen = self.factors.iter().filter(|each| each.role == Role::Choice);
+        let chosen = self
+            .factors
+            .iter()
+            .filter(|each| each.role == Role::Control);
         chosen
             .zip(candidate)
             .map(|(factor, value)| {

@@ -165,7 +165,7 @@ mod tests {
             let factor = Factor {
                 name: "x".to_owned(),
                 unit: String::new(),
-                role: Role::Choice,
+                role: Role::Control,
                 sampled: false,
                 kind: FactorKind::Levels(levels.collect()),
             };
@@ -182,7 +182,7 @@ mod tests {
         let factor = Factor {
             name: "x".to_owned(),
             unit: "mm".to_owned(),
-            role: Role::Circumstance,
+            role: Role::Noise,
             sampled: false,
             kind: FactorKind::Continuous {
                 low: -10.0,

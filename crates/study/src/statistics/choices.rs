@@ -133,7 +133,7 @@ impl ChoiceCounter {
         let chosen: Vec<(usize, &Factor)> = factors
             .iter()
             .enumerate()
-            .filter(|(_, factor)| factor.role == Role::Choice)
+            .filter(|(_, factor)| factor.role == Role::Control)
             .filter(|(_, factor)| match &factor.kind {
                 FactorKind::Levels(levels) => levels.len() > 1,
                 FactorKind::Continuous { low, high } => high > low,
@@ -142,7 +142,7 @@ impl ChoiceCounter {
         if chosen.is_empty() {
             return None;
         }
-        let levels = combinations(factors, |factor| factor.role == Role::Choice);
+        let levels = combinations(factors, |factor| factor.role == Role::Control);
         let sampled = chosen
             .iter()
             .filter(|(_, factor)| matches!(factor.kind, FactorKind::Continuous { .. }))

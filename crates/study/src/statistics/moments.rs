@@ -69,7 +69,7 @@ impl Points {
 
     /// The points of the cases of one candidate.
     pub(crate) fn of_one_choice(factors: &[Factor]) -> Self {
-        Self::repeated(factors, |factor| factor.role == Role::Circumstance)
+        Self::repeated(factors, |factor| factor.role == Role::Noise)
     }
 
     /// Points that are repeated in the combinations of those crossed factors that vary.
@@ -78,7 +78,7 @@ impl Points {
             let found = factors.iter().enumerate().filter(|(_, each)| wanted(each));
             found.map(|(index, _)| index).collect()
         };
-        let circumstance = |factor: &Factor| factor.role == Role::Circumstance;
+        let circumstance = |factor: &Factor| factor.role == Role::Noise;
         let repeats = if factors.iter().any(Factor::is_sampled) {
             combinations(factors, |factor| !factor.is_sampled() && vary(factor))
         } else {
@@ -102,7 +102,7 @@ impl Points {
     /// All noise factors together.
     pub(crate) fn of_circumstances(factors: &[Factor]) -> Self {
         let all = factors.iter().enumerate();
-        let keys = all.filter(|(_, factor)| factor.role == Role::Circumstance);
+        let keys = all.filter(|(_, factor)| factor.role == Role::Noise);
         Self {
             keys: keys.map(|(index, _)| index).collect(),
             repeats: 1,

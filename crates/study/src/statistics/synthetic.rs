@@ -83,7 +83,7 @@ pub(crate) fn levels(name: &str, role: Role, labels: &[&str]) -> Factor {
 }
 
 pub(crate) fn goal() -> Factor {
-    levels("goal", Role::Circumstance, &["lesion"])
+    levels("goal", Role::Noise, &["lesion"])
 }
 
 pub(crate) fn continuous(name: &str, role: Role, low: f64, high: f64) -> Factor {

@@ -119,9 +119,9 @@ fn ishigami(cases: u64) -> Synthetic {
         columns: columns().to_vec(),
         factors: vec![
             goal(),
-            continuous("x1", Role::Circumstance, -PI, PI),
-            continuous("x2", Role::Circumstance, -PI, PI),
-            continuous("x3", Role::Circumstance, -PI, PI),
+            continuous("x1", Role::Noise, -PI, PI),
+            continuous("x2", Role::Noise, -PI, PI),
+            continuous("x3", Role::Noise, -PI, PI),
         ],
         cases,
         case: Box::new(|case| {
@@ -173,8 +173,8 @@ fn factors_without_effect_have_none_in_small_samples_too() {
             columns: columns().to_vec(),
             factors: vec![
                 goal(),
-                continuous("a", Role::Circumstance, 0.0, 1.0),
-                continuous("b", Role::Circumstance, 0.0, 1.0),
+                continuous("a", Role::Noise, 0.0, 1.0),
+                continuous("b", Role::Noise, 0.0, 1.0),
             ],
             cases: 200,
             case: Box::new(move |case| {
@@ -213,8 +213,8 @@ fn repeated_points_do_not_pass_for_independent_layouts() {
         let results = Synthetic {
             columns: columns().to_vec(),
             factors: vec![
-                levels("goal", Role::Circumstance, &names),
-                continuous("x", Role::Circumstance, 0.0, 1.0),
+                levels("goal", Role::Noise, &names),
+                continuous("x", Role::Noise, 0.0, 1.0),
             ],
             cases: 2000,
             case: Box::new(move |case| {
@@ -246,9 +246,9 @@ fn choices() -> Synthetic {
         columns: columns().to_vec(),
         factors: vec![
             goal(),
-            levels("tool", Role::Choice, &["c", "a", "b"]),
-            continuous("x", Role::Circumstance, -1.0, 1.0),
-            continuous("y", Role::Circumstance, 0.0, 1.0),
+            levels("tool", Role::Control, &["c", "a", "b"]),
+            continuous("x", Role::Noise, -1.0, 1.0),
+            continuous("y", Role::Noise, 0.0, 1.0),
         ],
         cases: 3000,
         case: Box::new(|case| {
@@ -420,8 +420,8 @@ fn one_good_choice() -> Synthetic {
         columns: columns().to_vec(),
         factors: vec![
             goal(),
-            levels("tool", Role::Choice, &["bad", "good", "fair"]),
-            continuous("x", Role::Circumstance, 0.0, 1.0),
+            levels("tool", Role::Control, &["bad", "good", "fair"]),
+            continuous("x", Role::Noise, 0.0, 1.0),
         ],
         cases: 384,
         case: Box::new(|case| {
@@ -490,8 +490,8 @@ fn picking_the_best_of_many_equal_choices_is_seen_on_the_other_half() {
         columns: columns().to_vec(),
         factors: vec![
             goal(),
-            levels("place", Role::Choice, &names),
-            continuous("x", Role::Circumstance, 0.0, 1.0),
+            levels("place", Role::Control, &names),
+            continuous("x", Role::Noise, 0.0, 1.0),
         ],
         cases: 200 * 64,
         case: Box::new(|case| {
@@ -547,7 +547,7 @@ fn choices_that_are_too_many_to_be_ranked_are_not_judged_together() {
     let labels: Vec<&str> = labels.iter().map(String::as_str).collect();
     let results = Synthetic {
         columns: columns().to_vec(),
-        factors: vec![goal(), levels("place", Role::Choice, &labels)],
+        factors: vec![goal(), levels("place", Role::Control, &labels)],
         cases: 1100,
         case: Box::new(|case| {
             let mut rows = rejected();

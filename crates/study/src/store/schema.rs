@@ -203,8 +203,8 @@ fn describe(content: Content, manifest: &Manifest) -> String {
         Content::Number(factor) | Content::Label(factor) => {
             let factor = &manifest.factors[factor];
             let role = match factor.role {
-                Role::Choice => "control factor",
-                Role::Circumstance => "noise factor",
+                Role::Control => "control factor",
+                Role::Noise => "noise factor",
             };
             if factor.unit.is_empty() {
                 role.to_owned()

@@ -21,7 +21,7 @@ fn levels(name: &str, count: usize, sampled: bool) -> StudyFactor {
     StudyFactor {
         name: name.to_owned(),
         unit: String::new(),
-        role: Role::Choice,
+        role: Role::Control,
         sampled,
         values: FactorValues::Levels((0..count).map(level).collect()),
     }
@@ -31,7 +31,7 @@ fn uniform(name: &str) -> StudyFactor {
     StudyFactor {
         name: name.to_owned(),
         unit: "mm".to_owned(),
-        role: Role::Circumstance,
+        role: Role::Noise,
         sampled: true,
         values: FactorValues::Continuum {
             key: key(),

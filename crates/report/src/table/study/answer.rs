@@ -402,7 +402,7 @@ fn small(rate: &Rate) -> Option<String> {
 fn is_question(factor: &Factor) -> bool {
     match &factor.kind {
         FactorKind::Levels(levels) => {
-            factor.role == Role::Circumstance
+            factor.role == Role::Noise
                 && !factor.sampled
                 && (2..=MOST_LEVELS).contains(&levels.len())
                 && levels.iter().all(|level| level.number.is_none())

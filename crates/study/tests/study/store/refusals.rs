@@ -199,7 +199,7 @@ fn factors_that_make_no_table_are_refused() {
     let factor = |name: &str, levels: &[Level]| Factor {
         name: name.to_owned(),
         unit: String::new(),
-        role: needlebench_study::Role::Choice,
+        role: needlebench_study::Role::Control,
         sampled: false,
         kind: FactorKind::Levels(levels.to_vec()),
     };

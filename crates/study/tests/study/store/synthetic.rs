@@ -36,23 +36,23 @@ impl SyntheticDesign {
         });
         Self {
             factors: vec![
-                factor("goal", "", Role::Circumstance, labels(&["lung", "liver"])),
+                factor("goal", "", Role::Noise, labels(&["lung", "liver"])),
                 factor(
                     "phantom_size",
                     "",
-                    Role::Circumstance,
+                    Role::Noise,
                     FactorKind::Levels(sizes.to_vec()),
                 ),
                 factor(
                     "tool",
                     "",
-                    Role::Choice,
+                    Role::Control,
                     labels(&["short", "long, \"thin\"", "bent"]),
                 ),
                 factor(
                     "tilt_deg",
                     "deg",
-                    Role::Circumstance,
+                    Role::Noise,
                     FactorKind::Continuous {
                         low: -5.0,
                         high: 5.0,

@@ -37,7 +37,7 @@ impl Synthetic {
         let number = |name: &str, unit: &str, low, high| Factor {
             name: name.to_owned(),
             unit: unit.to_owned(),
-            role: Role::Circumstance,
+            role: Role::Noise,
             sampled: false,
             kind: FactorKind::Continuous { low, high },
         };
@@ -45,12 +45,12 @@ impl Synthetic {
             levels(
                 "goal",
                 &["left_upper_anterior", "right_pleural_lateral"],
-                Role::Circumstance,
+                Role::Noise,
             ),
             levels(
                 "tool",
                 &["perpendicular", "inline", "offset </script>"],
-                Role::Choice,
+                Role::Control,
             ),
             number("phantom_x", "mm", -60.0, 60.0),
             number("phantom_y", "mm", -60.0, 60.0),
