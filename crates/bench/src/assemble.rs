@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Point3;
 use needlebench_cell::{ClearanceClass, Rule};
 use needlebench_engine::{EngineIdentity, Recording, pieces_in_words};
-use needlebench_evaluation::metric::measured;
+use needlebench_evaluation::metric::set_measured;
 use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
     ClassClearance, ClassMarginReport, ClearanceReport, ConfigurationReport, EngineFailure,
@@ -258,7 +258,7 @@ pub(crate) fn goal_report(
                     Some(Err(error)) => report.budget_failure = Some(error.clone()),
                     None => {}
                 }
-                report.metrics = measured(&report);
+                set_measured(&mut report);
                 report
             })
             .collect(),
@@ -369,7 +369,8 @@ fn configuration_report(
             .map(|(room, each)| room.measure(goal_index, &each.joints)),
         budget: None,
         budget_failure: None,
-        metrics: BTreeMap::new(), // measured when the budget is there
+        measured: BTreeMap::new(), // when the budget is there
+        metrics: BTreeMap::new(),  // measured when the budget is there
         files: Vec::new(),
     }
 }

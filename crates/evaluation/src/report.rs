@@ -369,7 +369,9 @@ pub struct ConfigurationReport {
     pub budget: Option<ErrorBudget>,
     /// Why there is no budget, where there should be one.
     pub budget_failure: Option<String>,
-    /// Everything that was measured, by the keys of the [metrics](crate::metric), in SI units. The same
+    /// Everything that was measured, in SI units, with the unit at the end of the name: `tip_rms_m`.
+    pub measured: BTreeMap<String, f64>,
+    /// The same by the keys of the [metrics](crate::metric), as the command line and `[ranking]` use them. The same
     /// key is the same number in a study.
     pub metrics: BTreeMap<String, f64>,
     /// Files written for it, relative to the results folder.
@@ -414,6 +416,7 @@ impl ConfigurationReport {
             ranking: None,
             budget: None,
             budget_failure: None,
+            measured: BTreeMap::new(),
             metrics: BTreeMap::new(),
             files: Vec::new(),
         }

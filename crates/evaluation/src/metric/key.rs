@@ -131,6 +131,11 @@ impl MetricKey {
         format!("{}{}", self.key(), self.metric.unit.suffix)
     }
 
+    /// Name in results in SI units, with the unit: `tip_rms_m`.
+    pub fn si_name(&self) -> String {
+        format!("{}{}", self.key(), self.metric.unit.si_suffix())
+    }
+
     /// What exactly it is, with its unit in studies.
     pub fn description(&self) -> String {
         let unit = match self.metric.unit.symbol {
@@ -217,11 +222,26 @@ impl MetricKey {
     }
 }
 
-/// Everything that was measured of a configuration of a run, by its key.
-pub fn measured(configuration: &ConfigurationReport) -> BTreeMap<String, f64> {
+/// Everything that was measured of a configuration of a run, in SI units.
+fn readings(configuration: &ConfigurationReport) -> impl Iterator<Item = (MetricKey, f64)> {
     let engines: Vec<&str> = configuration.engines.keys().map(String::as_str).collect();
-    MetricKey::all(&engines)
+    let keys: Vec<MetricKey> = MetricKey::all(&engines)
         .filter(|each| each.of != Of::StaticCase)
-        .filter_map(|each| Some((each.key().into_owned(), each.read(configuration)?)))
-        .collect()
+        .collect();
+    let read = |each: MetricKey| {
+        let value = each.read(configuration)?;
+        Some((each, value))
+    };
+    keys.into_iter().filter_map(read)
+}
+
+/// Sets what a report says of what was measured, by keys, and by names with units.
+pub fn set_measured(configuration: &mut ConfigurationReport) {
+    let (mut metrics, mut measured) = (BTreeMap::new(), BTreeMap::new());
+    for (key, value) in readings(configuration) {
+        metrics.insert(key.key().into_owned(), value);
+        measured.insert(key.si_name(), value);
+    }
+    configuration.metrics = metrics;
+    configuration.measured = measured;
 }

@@ -19,7 +19,7 @@ pub use entry::{
     Better, Bound, Criterion, Draw, Heading, Metric, Missing, Precision, Role, Show, Source, Stage,
     Statistics,
 };
-pub use key::{MetricKey, measured};
+pub use key::{MetricKey, set_measured};
 pub use quantity::{Quantity, Unit};
 pub use resolution::{Resolved, resolve};
 pub use table::{GROUPS, Group};

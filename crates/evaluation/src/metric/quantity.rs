@@ -134,6 +134,16 @@ impl Unit {
         Self { symbol, suffix, si }
     }
 
+    /// End of a name of a value in SI units: `_m` where columns have `_mm`.
+    pub fn si_suffix(self) -> &'static str {
+        match self.suffix {
+            "_mm" | "_um" => "_m",
+            "_deg" => "_rad",
+            "_mm_mrad" => "_m_per_rad",
+            same => same,
+        }
+    }
+
     /// A value in SI units with the seven digits that a column of a study keeps of it.
     pub fn as_column(self, value: f64) -> f64 {
         #[expect(clippy::cast_possible_truncation, reason = "as columns are")]
@@ -158,6 +168,10 @@ mod tests {
             Quantity::Ratio,
         ] {
             let unit = quantity.column_unit();
+            // What is no SI unit has another name in SI.
+            let is_si = (unit.si - 1.0).abs() < f64::EPSILON;
+            let keeps_its_name = unit.si_suffix() == unit.suffix;
+            assert!(!keeps_its_name || is_si, "{unit:?}");
             let symbol = if unit.symbol == "1" { "" } else { unit.symbol };
             assert!(quantity.units().contains(&(symbol, unit.si)), "{unit:?}");
         }

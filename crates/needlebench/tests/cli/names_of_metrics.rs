@@ -17,6 +17,28 @@ budget_samples = 2
 [imperfections.breathing]
 ";
 
+/// `measured` has what `metrics` has, each name with its unit in SI.
+fn names_with_units_have_the_numbers_of_those_without(configuration: &serde_json::Value) {
+    let [metrics, measured] =
+        ["metrics", "measured"].map(|key| configuration[key].as_object().unwrap());
+    assert_eq!(metrics.len(), measured.len());
+    for (name, value) in metrics {
+        let key = MetricKey::named(name, &["rapier"]).unwrap();
+        let unit = match key.metric().unit.symbol {
+            "mm" | "um" => "_m",
+            "deg" => "_rad",
+            "s" => "_s",
+            "N" => "_n",
+            "m^3" => "_m3",
+            "mm/mrad" => "_m_per_rad",
+            "1" if name.starts_with("peak_") => "_ratio",
+            "1" => "",
+            other => panic!("{name} in {other}"),
+        };
+        assert_eq!(&measured[&format!("{name}{unit}")], value, "{name}");
+    }
+}
+
 /// Two places of the phantom.
 fn study(mode: &str) -> String {
     format!(
@@ -38,6 +60,9 @@ fn a_case_and_its_run_have_the_same_number_under_the_same_name() {
         assert!(matches!(status, Some(0 | 1)), "{status:?}");
         let report = bench.read_json(&format!("out/{mode}/cases/1/report.json"));
         let configurations = report["goals"][0]["configurations"].list();
+        configurations
+            .iter()
+            .for_each(names_with_units_have_the_numbers_of_those_without);
         for (row, configuration) in rows["rows"].list().iter().zip(configurations) {
             assert_eq!(row["configuration"], configuration["label"]);
             let mut shared = 0;

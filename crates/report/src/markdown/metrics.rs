@@ -7,8 +7,8 @@ use needlebench_evaluation::metric::{GROUPS, Group, Metric, MetricKey};
 use serde::Serialize;
 
 const INTRODUCTION: &str = "All metrics by which configurations are evaluated, ranked and compared. A name has the same \
-     meaning everywhere: in `report.json` (`configurations[].metrics`, in the unit under Report), \
-     in rankings, in columns of studies (in the unit under Study, which ends the column's name), \
+     meaning everywhere: in `report.json` (`configurations[].metrics`, in the unit under Report; \
+     `configurations[].measured` has the same with the unit at the end of the name, `tip_rms_m`), in rankings, in columns of studies (in the unit under Study, which ends the column's name), \
      and in `compare`. Names ending in `_static` belong to static cases of studies. A metric that \
      was not measured is absent, never 0.";
 
