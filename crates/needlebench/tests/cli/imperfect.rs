@@ -90,7 +90,7 @@ fn engines_and_balance_of_torques_agree_on_an_arm_under_another_gravity() {
     let bench = Bench::with_scenario(&text);
     let answer = bench.run("run s.toml --out a --wide");
     answer.says([
-        "simulation residuals of the arm without imperfections, whose controller assumes another gravity",
+        "simulated errors of the arm without imperfections, whose controller assumes another gravity",
         "note: the controller assumes a gravity of 9.82 m/s^2 instead of 9.80665 m/s^2",
     ]);
     let report = report(&bench, "a/small/report.json");

@@ -1,6 +1,6 @@
 //! Pictures and charts of a run's goals.
 
-use needlebench_evaluation::report::GoalReport;
+use needlebench_evaluation::report::Report;
 use needlebench_evaluation::room::RoomModel;
 use needlebench_parallel::in_parallel;
 use needlebench_render::{Image, tile};
@@ -10,7 +10,9 @@ use super::error::FilesError;
 use super::folder::Folder;
 use crate::chart::budget::budget_chart;
 use crate::chart::ranking::ranking_chart;
-use crate::picture::configuration::{Backdrop, configuration_picture, goal_camera, sheet_caption};
+use crate::picture::configuration::{
+    Backdrop, Shown, configuration_picture, goal_camera, sheet_caption,
+};
 use crate::picture::room::{RoomPictures, room_caption};
 
 /// What is added to the names of pictures: those of the posture, those of the free space.
@@ -55,12 +57,13 @@ impl<'a> Pictures<'a> {
     pub(super) fn write(
         &self,
         index: usize,
-        report: &GoalReport,
+        run: &Report,
         names: &mut [Vec<String>],
     ) -> Result<(), FilesError> {
         let goal = &self.resolved.goals[index].name;
+        let report = &run.goals[index];
         let mut sheets = [Vec::new(), Vec::new()];
-        for (at, pictures) in self.draw(index, report).into_iter().enumerate() {
+        for (at, pictures) in self.draw(index, run).into_iter().enumerate() {
             let configuration = &report.configurations[at];
             let captions = [
                 sheet_caption(report, configuration),
@@ -100,22 +103,27 @@ impl<'a> Pictures<'a> {
     }
 
     /// Pictures of all configurations of a goal, on all threads.
-    fn draw(&self, index: usize, report: &GoalReport) -> Vec<[Option<Image>; 2]> {
+    fn draw(&self, index: usize, run: &Report) -> Vec<[Option<Image>; 2]> {
         let goal = &self.resolved.goals[index];
         let camera = goal_camera(self.resolved, goal);
         let room = RoomPictures::new(self.resolved, &self.backdrop, &self.room, index);
-        let all = report.configurations.iter();
+        let all = run.goals[index].configurations.iter();
         let all: Vec<_> = all.flat_map(|each| [(each, false), (each, true)]).collect();
         let drawn = in_parallel(self.jobs, &all, |(configuration, is_room)| {
+            let shown = Shown {
+                run,
+                goal,
+                configuration,
+            };
             if *is_room {
-                room.draw(configuration)
+                room.draw(&shown)
             } else {
-                configuration_picture(self.resolved, &self.backdrop, &camera, goal, configuration)
+                configuration_picture(self.resolved, &self.backdrop, &camera, &shown)
             }
         });
         let mut drawn = drawn.into_iter();
         let mut next = || drawn.next().flatten();
-        report
+        run.goals[index]
             .configurations
             .iter()
             .map(|_| [next(), next()])

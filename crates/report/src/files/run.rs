@@ -75,8 +75,8 @@ pub fn write_run(
     if pictures && !wanted.cancel.load(Ordering::Relaxed) {
         progress.message("drawing");
         let drawing = Pictures::new(resolved, folder, wanted.jobs);
-        for (index, goal) in finished.report.goals.iter().enumerate() {
-            drawing.write(index, goal, &mut names[index])?;
+        for (index, names) in names.iter_mut().enumerate() {
+            drawing.write(index, &finished.report, names)?;
         }
     } else {
         for goal in &resolved.goals {

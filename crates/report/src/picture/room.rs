@@ -15,7 +15,7 @@ use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::people::Person;
 
 use super::configuration::{
-    Backdrop, floor, posture_scene, sheet_caption, status_in_words, viewpoint,
+    Backdrop, Shown, floor, posture_scene, sheet_caption, status_in_words, viewpoint,
 };
 use super::voxels::voxel_surface;
 
@@ -70,7 +70,8 @@ impl<'a> RoomPictures<'a> {
     }
 
     /// Draws one configuration in its final posture; `None` if it has none.
-    pub fn draw(&self, report: &ConfigurationReport) -> Option<Image> {
+    pub(crate) fn draw(&self, shown: &Shown<'_>) -> Option<Image> {
+        let report = shown.configuration;
         let q = Joints::from_column_slice(&report.joints_rad?);
         let room = report.room.as_ref()?;
         let mut scene = posture_scene(self.resolved, self.backdrop, &q);
@@ -89,7 +90,7 @@ impl<'a> RoomPictures<'a> {
             width_px: 2.5,
         });
         scene.labels.push(Label {
-            text: title(report, room),
+            text: title(shown, room),
             anchor: Anchor::TopLeft,
         });
         scene.labels.push(Label {
@@ -255,8 +256,9 @@ fn cone(half_angle_rad: f64, length_m: f64) -> TriangleMesh {
     mesh
 }
 
-fn title(report: &ConfigurationReport, room: &RoomReport) -> String {
-    let status = status_in_words(report);
+fn title(shown: &Shown<'_>, room: &RoomReport) -> String {
+    let report = shown.configuration;
+    let status = status_in_words(shown);
     format!(
         "{}\n{status}\nelbow {} ({:+.0} mm)",
         report.label,

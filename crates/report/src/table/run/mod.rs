@@ -59,7 +59,7 @@ fn write_report(
             .iter()
             .any(|each| !each.engines.is_empty())
         {
-            writeln!(out, "simulation residuals of {}", simulated_arm(report))?;
+            writeln!(out, "{}", simulated_arm(report))?;
             writeln!(out, "{}", goal_table(report, goal, &checks, Mostly::Left))?;
         }
         if let Some(comparison) = comparison_text(goal) {
@@ -279,17 +279,18 @@ fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::
     Ok(())
 }
 
-/// The arm that the engines simulated.
+/// Heading of the errors in the engines: of what arm they are.
 fn simulated_arm(report: &Report) -> &'static str {
     let of_class = report.expected.as_ref();
     let of_class = of_class.is_some_and(|expected| expected.arm.is_some());
     if report.truth.is_some() && of_class {
         // Without [imperfections] of its own.
-        "the arm without imperfections, whose controller assumes another gravity"
+        "simulated errors of the arm without imperfections, whose controller assumes another gravity"
     } else if report.truth.is_some() {
-        "the arm and patient sampled by the seed"
+        "simulated errors of the arm and patient sampled by the seed"
     } else {
-        "the arm without imperfections: control and integration errors only, not the accuracy of a real arm"
+        "simulation residuals of the arm without imperfections: control and integration errors only, \
+         not the accuracy of a real arm"
     }
 }
 
