@@ -8,7 +8,7 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use robust::{Coord3D, orient3d};
 
 use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
@@ -94,6 +94,8 @@ struct Face {
 
 struct Hull<'a> {
     points: &'a [Point3<f64>],
+    /// Inside.
+    centre: Point3<f64>,
     faces: Vec<Face>,
     /// From which height over a face a point is added, m.
     left_out_m: f64,
@@ -128,8 +130,10 @@ impl<'a> Hull<'a> {
         if !has_volume {
             return Err(HullError::Flat);
         }
+        let corners = [a, b, c, d].map(|i| points[i].coords);
         let mut hull = Self {
             points,
+            centre: Point3::from(corners.iter().sum::<Vector3<f64>>() * 0.25),
             faces: Vec::new(),
             left_out_m: left_out_m.max(HULL_TOLERANCE * size_m),
         };
@@ -199,7 +203,8 @@ impl<'a> Hull<'a> {
             }
             // A point is looked for over new faces only, which no rounding of heights makes miss it by
             // more than that: seen, not trusted.
-            if self.assign(0..self.points.len(), 0..self.faces.len()) == 0 {
+            let outside = self.not_held();
+            if self.assign(outside.into_iter(), 0..self.faces.len()) == 0 {
                 return Ok(());
             }
             at = 0;
@@ -223,6 +228,103 @@ impl<'a> Hull<'a> {
             }
         }
         assigned
+    }
+
+    /// Points that may be outside by more than is left out: all that are, and hardly any other.
+    ///
+    /// Of each point only those faces are asked that it can be in front of: the one that the ray from the centre
+    /// through the point passes, and all that are connected with it by faces that the point is in front of. A point
+    /// behind the first is inside; the faces that a point outside sees are connected, and the first is one of them.
+    fn not_held(&self) -> Vec<usize> {
+        let Some(mut at) = self.faces.iter().position(|face| face.alive) else {
+            return Vec::new();
+        };
+        let mut is_held = |point: &usize| {
+            let Some((passed, reach)) = self.passed_face(at, *point) else {
+                return false;
+            };
+            // Neighbours in a mesh are neighbours in its list of vertices, mostly.
+            at = passed;
+            reach <= 1.0 || self.is_held(passed, *point)
+        };
+        (0..self.points.len())
+            .filter(|point| !is_held(point))
+            .collect()
+    }
+
+    /// The face that the ray from the centre through a point passes, and how far out the point is, 1 on the face; none
+    /// where too many faces lie in one plane.
+    ///
+    /// A face's reach is the share of the way from the centre to its plane that the point has gone. The faces'
+    /// normals over their planes' distances are the corners of the polar body, which is convex: the reach is linear
+    /// there, so a face that none of its neighbours surpasses has the greatest one. Faces of one plane are one corner
+    /// there, and their neighbours are asked together.
+    fn passed_face(&self, from: usize, point: usize) -> Option<(usize, f64)> {
+        /// Reaches that differ by less are those of one plane.
+        const ONE_PLANE: f64 = 1e-9;
+        /// Faces of one plane that are asked.
+        const MOST: usize = 256;
+        let towards = self.points[point] - self.centre;
+        let (mut at, mut best) = (from, self.reach(from, &towards));
+        // Not of a face without an area.
+        if !best.is_finite() {
+            return None;
+        }
+        loop {
+            let mut plane = vec![at];
+            let mut next = 0;
+            let farther = 'plane: loop {
+                let face = *plane.get(next)?;
+                next += 1;
+                for beyond in self.faces[face].neighbours {
+                    let reach = self.reach(beyond, &towards);
+                    if reach > best {
+                        break 'plane Some((beyond, reach));
+                    }
+                    if reach > best - ONE_PLANE * best.abs() && !plane.contains(&beyond) {
+                        plane.push(beyond);
+                    }
+                }
+                if next == plane.len() {
+                    break None;
+                }
+                if next == MOST {
+                    return None;
+                }
+            };
+            match farther {
+                Some(farther) => (at, best) = farther,
+                None => return Some((at, best)),
+            }
+        }
+    }
+
+    /// How far out a point is by the plane of a face: 0 in the centre, 1 in the plane.
+    fn reach(&self, face: usize, towards: &Vector3<f64>) -> f64 {
+        let [a, b, c] = self.faces[face].corners.map(|corner| self.points[corner]);
+        let normal = (b - a).cross(&(c - a));
+        normal.dot(towards) / normal.dot(&(a - self.centre))
+    }
+
+    /// Whether a point is outside by no more than is left out; `passed` is the face that its ray passes.
+    fn is_held(&self, passed: usize, point: usize) -> bool {
+        let mut seen = vec![passed];
+        let mut next = 0;
+        while let Some(&face) = seen.get(next) {
+            next += 1;
+            if self.volume(self.faces[face].corners, point) <= 0.0 {
+                continue;
+            }
+            if self.height_m(face, point) > self.left_out_m {
+                return false;
+            }
+            for beyond in self.faces[face].neighbours {
+                if !seen.contains(&beyond) {
+                    seen.push(beyond);
+                }
+            }
+        }
+        true
     }
 
     /// Takes in a point that sees a face: all faces that it sees make way for new ones to their rim.
@@ -383,6 +485,43 @@ mod tests {
         let hull = convex_hull(&points).unwrap().0;
         assert_eq!(hull.vertices_m.len(), 500);
         assert_hull(&points, &hull, 1e-9);
+    }
+
+    /// While a hull grows, the points outside of it are those that some face sees, asked one by one.
+    #[test]
+    fn points_outside_are_found_by_few_faces() {
+        for points in [
+            filled_box(),
+            turned_cylinder(64, 5),
+            turned_cylinder(256, 9),
+        ] {
+            let mut hull = Hull::around(&points, 2e-5).unwrap();
+            let mut rounds = 0_usize;
+            loop {
+                let next = hull.faces.iter().position(|face| !face.outside.is_empty());
+                if next.is_none() || rounds.is_power_of_two() {
+                    let seen_by_any: Vec<usize> = (0..points.len())
+                        .filter(|&point| {
+                            (0..hull.faces.len()).any(|face| {
+                                hull.faces[face].alive
+                                    && hull.height_m(face, point) > hull.left_out_m
+                            })
+                        })
+                        .collect();
+                    let mut found = hull.not_held();
+                    // What is in one plane with hundreds of faces may be among them.
+                    found.retain(|point| {
+                        seen_by_any.contains(point) || hull.passed_face(0, *point).is_some()
+                    });
+                    assert_eq!(found, seen_by_any, "after {rounds} points");
+                }
+                let Some(face) = next else { break };
+                let point = hull.faces[face].outside[0];
+                hull.add(point, face).unwrap();
+                rounds += 1;
+            }
+            assert!(rounds > 2, "{rounds}");
+        }
     }
 
     #[test]
