@@ -50,10 +50,9 @@ impl PreparedSolids {
             let in_parent = parent_from_world.after(&segment.world_from_segment);
             segment.shape.bound.placed(&in_parent)
         };
-        let gaps = self.1.iter().map(|other| bound.gap_m(other));
-        let gaps: Vec<(usize, f64)> = gaps
-            .enumerate()
-            .filter(|(index, _)| wanted(*index))
+        let gaps: Vec<(usize, f64)> = (0..self.0.len())
+            .filter(|index| wanted(*index))
+            .map(|index| (index, bound.gap_m(&self.1[index])))
             .collect();
         // The most promising one first: its distance leaves most others out.
         let &(promising, _) = gaps.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -81,6 +80,10 @@ impl PreparedSolids {
     /// Whether a point of the parent's frame is in one of them, its surface included: what [`Solid::contains`] says, for
     /// meshes by their search tree.
     pub fn contains(&self, index: usize, point: &Point3<f64>) -> bool {
+        // Of some hundred parts a point is in one or none: most are told by what encloses them.
+        if self.1[index].gap_to_point_m(point) > PRUNING_MARGIN_M {
+            return false;
+        }
         let (shape, parent_from_shape) = &self.0[index];
         if let Some(tree) = shape.surface() {
             return tree.contains(&(parent_from_shape.inverse() * point));

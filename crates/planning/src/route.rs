@@ -1,5 +1,7 @@
 //! What the planned needle passes on its way from the skin to its end.
 
+use std::cell::OnceCell;
+
 use nalgebra::Point3;
 use needlebench_cell::{Cell, ClearanceClass, Rule, part_in_words};
 use needlebench_clearance::ROUNDING_M;
@@ -29,7 +31,10 @@ pub fn needle_route<'a>(
     placed: &'a PlacedPhantom,
     goal: &Goal,
 ) -> Option<RouteClearance<'a>> {
-    nearest_of(cell, placed, goal, |part| part.tissue != Tissue::Fissure)
+    let entered = Entered::new(placed, goal);
+    nearest_of(cell, placed, goal, &entered, |part| {
+        part.tissue != Tissue::Fissure
+    })
 }
 
 /// Names of the fissures of the lungs that the planned needle touches or crosses, in the order of the
@@ -40,9 +45,12 @@ pub fn crossed_fissures(resolved: &ResolvedScenario, goal: &Goal) -> Vec<String>
     };
     let parts = &placed.phantom.route_obstacles().parts;
     let fissures = parts.iter().filter(|part| part.tissue == Tissue::Fissure);
+    let entered = Entered::new(placed, goal);
     let is_crossed = |fissure: &&RouteObstacle| {
-        nearest_of(&resolved.cell, placed, goal, |part| part == *fissure)
-            .is_some_and(|nearest| nearest.separation.distance_m - ROUNDING_M <= 0.0)
+        nearest_of(&resolved.cell, placed, goal, &entered, |part| {
+            part == *fissure
+        })
+        .is_some_and(|nearest| nearest.separation.distance_m - ROUNDING_M <= 0.0)
     };
     fissures
         .filter(is_crossed)
@@ -54,15 +62,14 @@ fn nearest_of<'a>(
     cell: &Cell,
     placed: &'a PlacedPhantom,
     goal: &Goal,
+    entered: &Entered<'_, '_>,
     wanted: impl Fn(&RouteObstacle) -> bool,
 ) -> Option<RouteClearance<'a>> {
     let obstacles = placed.phantom.route_obstacles();
     let entry = goal.entry_m?;
-    let entered = entered(placed, goal);
     let counts = |index: usize| {
         let part = &obstacles.parts[index];
-        let organ = part.organ.as_deref().unwrap_or(&part.name);
-        !entered.contains(&organ) && wanted(part)
+        wanted(part) && !entered.is(part)
     };
     let (index, separation) = obstacles.solids.nearest_to_segment(
         &entry,
@@ -79,17 +86,45 @@ fn nearest_of<'a>(
 
 /// Structures that the needle must enter: the organ of the target, and what holds the lesion that it is aimed at, such
 /// as a rib.
-fn entered<'a>(placed: &'a PlacedPhantom, goal: &'a Goal) -> Vec<&'a str> {
-    let mut entered: Vec<&str> = goal.target_organ.as_deref().into_iter().collect();
-    if goal.lesion.is_some() {
-        let target = placed.world_from_phantom.inverse() * goal.target_m;
-        let obstacles = placed.phantom.route_obstacles();
-        let holding = obstacles.parts.iter().enumerate().filter(|(index, part)| {
-            part.tissue == Tissue::Bone && obstacles.solids.contains(*index, &target)
-        });
-        entered.extend(holding.map(|(_, part)| part.organ.as_deref().unwrap_or(&part.name)));
+struct Entered<'p, 'g> {
+    placed: &'p PlacedPhantom,
+    goal: &'g Goal,
+    /// Found when something is asked for the first time: hundreds of parts may hold the target.
+    organs: OnceCell<Vec<String>>,
+}
+
+impl<'p, 'g> Entered<'p, 'g> {
+    fn new(placed: &'p PlacedPhantom, goal: &'g Goal) -> Self {
+        Self {
+            placed,
+            goal,
+            organs: OnceCell::new(),
+        }
     }
-    entered
+
+    fn is(&self, part: &RouteObstacle) -> bool {
+        let organs = self.organs.get_or_init(|| self.find());
+        organs.iter().any(|organ| organ == organ_of(part))
+    }
+
+    fn find(&self) -> Vec<String> {
+        let Self { placed, goal, .. } = *self;
+        let mut entered: Vec<String> = goal.target_organ.iter().cloned().collect();
+        if goal.lesion.is_some() {
+            let target = placed.world_from_phantom.inverse() * goal.target_m;
+            let obstacles = placed.phantom.route_obstacles();
+            let holding = obstacles.parts.iter().enumerate().filter(|(index, part)| {
+                part.tissue == Tissue::Bone && obstacles.solids.contains(*index, &target)
+            });
+            entered.extend(holding.map(|(_, part)| organ_of(part).to_owned()));
+        }
+        entered
+    }
+}
+
+/// The organ that a part belongs to; itself, if to none.
+fn organ_of(part: &RouteObstacle) -> &str {
+    part.organ.as_deref().unwrap_or(&part.name)
 }
 
 /// Where the needle's tip ends, or the target where that is deeper.
@@ -161,10 +196,11 @@ pub fn judged_tissues<'a>(
 ) -> impl Iterator<Item = RouteJudgement<'a>> {
     let section = &resolved.scenario.planning.needle_route;
     let tissues = [Tissue::Bone, Tissue::Vessel, Tissue::Organ].into_iter();
+    let entered = Entered::new(placed, goal);
     tissues.filter_map(move |tissue| {
         let margin_m = margin_m(section, tissue)?;
         let wanted = |part: &RouteObstacle| part.tissue == tissue && !is_off(section, part);
-        let nearest = nearest_of(&resolved.cell, placed, goal, wanted)?;
+        let nearest = nearest_of(&resolved.cell, placed, goal, &entered, wanted)?;
         Some(RouteJudgement {
             distance_m: nearest.separation.distance_m - ROUNDING_M,
             nearest,

@@ -1,6 +1,6 @@
 //! Capsules around shapes: cheap lower bounds of a distance.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::placement::Placement;
 
@@ -146,6 +146,18 @@ impl BoundingCapsule {
     #[inline]
     pub fn gap_m(&self, other: &Self) -> f64 {
         self.towards(other).norm() - self.radius_m - other.radius_m
+    }
+
+    /// The same of a point.
+    pub fn gap_to_point_m(&self, point: &Point3<f64>) -> f64 {
+        let between = point.coords - self.centre;
+        let squared = self.half_axis.norm_squared();
+        let along = if squared > 0.0 {
+            (between.dot(&self.half_axis) / squared).clamp(-1.0, 1.0)
+        } else {
+            0.0
+        };
+        (between - self.half_axis * along).norm() - self.radius_m
     }
 
     /// From the axis of one to the axis of the other by the shortest way.
