@@ -26,7 +26,7 @@ pub(crate) use hand_cone::CONE_START_M;
 pub use hand_cone::{CONE_TOLERANCE_RAD, HandCone, hand_cone};
 pub use obstacles::{Obstacles, PlacedObstacles, SightLines};
 pub use sector::Sector;
-pub use sight::{ENTRY_DISC_HEIGHT_M, Sight, SightTargets, measure_sight, sight_segments};
+pub use sight::{ENTRY_DISC_HEIGHT_M, OpenLines, Sight, SightTargets, sight_segments};
 
 /// Radius of the hemisphere about the entry point in which free space is measured, m: as far as a forearm with a hand
 /// reaches.
@@ -112,10 +112,14 @@ pub struct RoomModel<'a> {
     sides: Option<PatientSides>,
     /// Of each goal, made on first use.
     sectors: Vec<OnceLock<Sector>>,
+    /// Of each goal by person and stature, for the needle where the goal has it; made on first use.
+    open_lines: Vec<OnceLock<Vec<OpenLines>>>,
     /// Points all over the arm: body and place in it, m.
     surface: Vec<(usize, Vec<Point3<f64>>)>,
 }
 
+/// Needles that lie nearer to each other are the same for lines of sight, m: rounding of inverse kinematics.
+const SAME_PLACE_M: f64 = 1e-8;
 /// Distance of two points of the arm's surface that are asked whether they are over the patient, m.
 const SURFACE_SPACING_M: f64 = 0.01;
 /// Fineness of curved surfaces, m.
@@ -149,6 +153,7 @@ impl<'a> RoomModel<'a> {
             obstacles,
             sides,
             sectors: resolved.goals.iter().map(|_| OnceLock::new()).collect(),
+            open_lines: resolved.goals.iter().map(|_| OnceLock::new()).collect(),
             surface,
         }
     }
@@ -188,18 +193,42 @@ impl<'a> RoomModel<'a> {
 
     /// What people look at.
     pub fn targets(&self, goal: usize, q: &Joints) -> SightTargets {
+        self.targets_behind(goal, &self.guide_entry(q))
+    }
+
+    /// The same with the guide where the goal has it.
+    fn goal_targets(&self, goal: usize) -> SightTargets {
+        let exit = self.resolved.goals[goal].world_from_guide_exit;
+        let length_m = self.resolved.cell.tool.guide_length_m();
+        let entry = exit * Pose::translation(0.0, 0.0, -length_m);
+        self.targets_behind(goal, &entry)
+    }
+
+    fn targets_behind(&self, goal: usize, entry: &Pose) -> SightTargets {
         let sector = self.sector(goal);
         let tool = &self.resolved.cell.tool;
         let standoff_m = self.resolved.goals[goal].standoff_m.unwrap_or(0.0);
         // With the tip on the skin; a needle too short for that ends at the guide.
         let hub_m = (tool.needle.length_m - tool.guide_length_m() - standoff_m).max(CONE_START_M);
-        let entry = self.guide_entry(q);
         SightTargets {
             entry_m: sector.center_m,
             outwards: sector.outwards,
             needle_m: [CONE_START_M, hub_m]
                 .map(|behind_m| entry * Point3::new(0.0, 0.0, -behind_m)),
         }
+    }
+
+    /// What the surroundings leave of the sight of each person in each stature.
+    fn lines_of_people(&self, goal: usize, targets: &SightTargets) -> Vec<OpenLines> {
+        let surroundings = self.obstacles.surroundings();
+        let mut lines = Vec::new();
+        for person in &self.resolved.people.by_goal[goal] {
+            lines.extend(person.statures_m.iter().map(|&stature_m| {
+                let eyes_m = person.eyes_m(stature_m);
+                OpenLines::new(&surroundings, &eyes_m, person.head_movement_m, targets)
+            }));
+        }
+        lines
     }
 
     /// Length of the hand cone, m: that of the access zone.
@@ -219,14 +248,24 @@ impl<'a> RoomModel<'a> {
         let all = self.obstacles.all(q);
         let targets = self.targets(goal, q);
         let people = &self.resolved.people;
-        let (robot, surroundings) = (self.obstacles.robot(q), self.obstacles.surroundings());
+        let robot = self.obstacles.robot(q);
+        // Every configuration holds the needle in the same place, up to rounding.
+        let nominal = self.goal_targets(goal);
+        let own;
+        let lines = if nominal.is_within(&targets, SAME_PLACE_M) {
+            self.open_lines[goal].get_or_init(|| self.lines_of_people(goal, &nominal))
+        } else {
+            own = self.lines_of_people(goal, &targets);
+            &own
+        };
+        let mut lines = lines.iter();
         let mut sight = Vec::new();
         for person in &people.by_goal[goal] {
             let hand_side = sector.free_towards(&taken, &hand_side(person, &sector.center_m));
             for &stature_m in &person.statures_m {
+                let lines = lines.next().expect("there are lines of each stature");
+                let seen = lines.past(&robot);
                 let eyes_m = person.eyes_m(stature_m);
-                let moves_m = person.head_movement_m;
-                let seen = measure_sight(&robot, &surroundings, &eyes_m, moves_m, &targets);
                 sight.push(SightReport {
                     person: person.name.clone(),
                     person_in_words: person.in_words(stature_m),

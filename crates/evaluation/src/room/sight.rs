@@ -30,6 +30,14 @@ pub struct SightTargets {
     pub needle_m: [Point3<f64>; 2],
 }
 
+impl SightTargets {
+    /// Whether no point of the needle is farther from that of other targets at the same entry.
+    pub(super) fn is_within(&self, other: &Self, distance_m: f64) -> bool {
+        let mut ends = self.needle_m.iter().zip(&other.needle_m);
+        ends.all(|(a, b)| (a - b).norm() <= distance_m)
+    }
+}
+
 /// Which part of the sight the robot leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sight {
@@ -116,66 +124,101 @@ fn series(
     })
 }
 
-/// Measures what a robot leaves of the sight of one person of one stature; `surroundings` is what is in
-/// the way without it.
+/// Lines of sight of one person of one stature, and which of them phantom, table, gantry, mount and obstacles leave
+/// free: the same for every configuration, so it is found once.
 ///
-/// `SIGHT_SERIES` times `SIGHT_SEGMENTS` segments each to skin and needle, the same for every
-/// configuration, so that differences come from the arm alone. [`Sight::accuracy`] says how far the
-/// shares may be from the true ones.
-pub fn measure_sight(
-    robot: &PlacedObstacles<'_>,
-    surroundings: &PlacedObstacles<'_>,
-    eyes_m: &Point3<f64>,
+/// `SIGHT_SERIES` times `SIGHT_SEGMENTS` segments each to skin and needle.
+#[derive(Debug, Clone)]
+pub struct OpenLines {
+    eyes_m: Point3<f64>,
     head_movement_m: f64,
-    targets: &SightTargets,
-) -> Sight {
-    /// Segments that the surroundings leave, and those of them that the robot leaves; to skin and needle.
-    type Counts = [[u32; 2]; 2];
-    let share = |of: f64, all: f64| if all > 0.0 { of / all } else { 0.0 };
-    let fractions =
-        |counts: &Counts| counts.map(|[open, free]| share(f64::from(free), f64::from(open)));
-    let mut blocked: Vec<(usize, u32)> = Vec::new();
-    let mut all: Counts = [[0; 2]; 2];
-    let mut means = Vec::new();
-    let (mut past_robot, mut past_surroundings) = (robot.lines(), surroundings.lines());
-    for start in starts() {
-        let mut counts: Counts = [[0; 2]; 2];
-        let segments = series(eyes_m, head_movement_m, targets, SIGHT_SEGMENTS, start);
-        for (index, [eye, target]) in segments.enumerate() {
-            if past_surroundings.is_in_the_way(&eye, &target) {
-                continue;
-            }
-            let [open, free] = &mut counts[index % 2];
-            *open += 1;
-            match past_robot.first_on_the_way(&eye, &target) {
-                None => *free += 1,
-                Some((_, solid)) => match blocked.iter_mut().find(|(known, _)| *known == solid) {
-                    Some((_, count)) => *count += 1,
-                    None => blocked.push((solid, 1)),
-                },
-            }
-        }
-        let [entry, needle] = fractions(&counts);
-        means.push(0.5 * (entry + needle));
-        for (sum, of_series) in all.iter_mut().flatten().zip(counts.iter().flatten()) {
-            *sum += of_series;
+    targets: SightTargets,
+    /// By segment, the series one after the other.
+    is_open: Vec<bool>,
+}
+
+impl OpenLines {
+    /// Past the surroundings.
+    pub fn new(
+        surroundings: &PlacedObstacles<'_>,
+        eyes_m: &Point3<f64>,
+        head_movement_m: f64,
+        targets: &SightTargets,
+    ) -> Self {
+        let mut past = surroundings.lines();
+        let is_open = starts()
+            .flat_map(|start| series(eyes_m, head_movement_m, targets, SIGHT_SEGMENTS, start))
+            .map(|[eye, target]| !past.is_in_the_way(&eye, &target))
+            .collect();
+        Self {
+            eyes_m: *eyes_m,
+            head_movement_m,
+            targets: *targets,
+            is_open,
         }
     }
-    let worst = blocked
-        .iter()
-        .max_by_key(|(solid, count)| (*count, std::cmp::Reverse(*solid)));
-    let series = f64::from(SIGHT_SERIES);
-    let mean = means.iter().sum::<f64>() / series;
-    let squares: f64 = means.iter().map(|each| (each - mean) * (each - mean)).sum();
-    let standard_error = (squares / (series - 1.0) / series).sqrt();
-    let [entry_fraction, needle_fraction] = fractions(&all);
-    let segments = series * f64::from(SIGHT_SEGMENTS);
-    let open: f64 = all.iter().map(|[open, _]| f64::from(*open)).sum();
-    Sight {
-        entry_fraction,
-        needle_fraction,
-        without_robot_fraction: 0.5 * open / segments,
-        accuracy: (STUDENT_95 * standard_error).max(1.0 / segments),
-        blocker: worst.map(|(solid, _)| robot.name(*solid).to_owned()),
+
+    /// What a robot leaves of them.
+    ///
+    /// [`Sight::accuracy`] says how far the shares may be from the true ones.
+    pub fn past(&self, robot: &PlacedObstacles<'_>) -> Sight {
+        /// Segments that the surroundings leave, and those of them that the robot leaves; to skin and needle.
+        type Counts = [[u32; 2]; 2];
+        let share = |of: f64, all: f64| if all > 0.0 { of / all } else { 0.0 };
+        let fractions =
+            |counts: &Counts| counts.map(|[open, free]| share(f64::from(free), f64::from(open)));
+        let mut blocked: Vec<(usize, u32)> = Vec::new();
+        let mut all: Counts = [[0; 2]; 2];
+        let mut means = Vec::new();
+        let mut past_robot = robot.lines();
+        let of_series = self.is_open.chunks(2 * SIGHT_SEGMENTS as usize);
+        for (start, is_open) in starts().zip(of_series) {
+            let mut counts: Counts = [[0; 2]; 2];
+            let segments = series(
+                &self.eyes_m,
+                self.head_movement_m,
+                &self.targets,
+                SIGHT_SEGMENTS,
+                start,
+            );
+            for (index, ([eye, target], is_open)) in segments.zip(is_open).enumerate() {
+                if !is_open {
+                    continue;
+                }
+                let [open, free] = &mut counts[index % 2];
+                *open += 1;
+                match past_robot.first_on_the_way(&eye, &target) {
+                    None => *free += 1,
+                    Some((_, solid)) => {
+                        match blocked.iter_mut().find(|(known, _)| *known == solid) {
+                            Some((_, count)) => *count += 1,
+                            None => blocked.push((solid, 1)),
+                        }
+                    }
+                }
+            }
+            let [entry, needle] = fractions(&counts);
+            means.push(0.5 * (entry + needle));
+            for (sum, of_series) in all.iter_mut().flatten().zip(counts.iter().flatten()) {
+                *sum += of_series;
+            }
+        }
+        let worst = blocked
+            .iter()
+            .max_by_key(|(solid, count)| (*count, std::cmp::Reverse(*solid)));
+        let series = f64::from(SIGHT_SERIES);
+        let mean = means.iter().sum::<f64>() / series;
+        let squares: f64 = means.iter().map(|each| (each - mean) * (each - mean)).sum();
+        let standard_error = (squares / (series - 1.0) / series).sqrt();
+        let [entry_fraction, needle_fraction] = fractions(&all);
+        let segments = series * f64::from(SIGHT_SEGMENTS);
+        let open: f64 = all.iter().map(|[open, _]| f64::from(*open)).sum();
+        Sight {
+            entry_fraction,
+            needle_fraction,
+            without_robot_fraction: 0.5 * open / segments,
+            accuracy: (STUDENT_95 * standard_error).max(1.0 / segments),
+            blocker: worst.map(|(solid, _)| robot.name(*solid).to_owned()),
+        }
     }
 }

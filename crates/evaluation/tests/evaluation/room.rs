@@ -6,8 +6,8 @@ use std::path::Path;
 use nalgebra::{Point3, Vector3};
 use needlebench_cell::{BodyKind, Cell, CollisionBody, Frame};
 use needlebench_evaluation::room::{
-    CONE_TOLERANCE_RAD, ENTRY_DISC_HEIGHT_M, Obstacles, RoomModel, Sector, SightTargets, hand_cone,
-    measure_sight,
+    CONE_TOLERANCE_RAD, ENTRY_DISC_HEIGHT_M, Obstacles, OpenLines, RoomModel, Sector, SightTargets,
+    hand_cone,
 };
 use needlebench_geometry::{Shape, Solid};
 use needlebench_kinematics::ik::{Configuration, Elbow};
@@ -222,13 +222,9 @@ fn sight_past_a_half_plane_is_the_share_of_the_disc_beyond_it() {
             Pose::translation(edge_m - 0.5, 0.0, 0.5),
         );
         let obstacles = Obstacles::new(&cell);
-        let seen = measure_sight(
-            &obstacles.robot(&Joints::zeros()),
-            &obstacles.surroundings(),
-            &Point3::new(0.0, 0.0, 1.0),
-            0.0,
-            &targets,
-        );
+        let eyes = Point3::new(0.0, 0.0, 1.0);
+        let lines = OpenLines::new(&obstacles.surroundings(), &eyes, 0.0, &targets);
+        let seen = lines.past(&obstacles.robot(&Joints::zeros()));
         // On the disc of 30 mm the shadow's edge is at twice the plate's.
         let ratio: f64 = 2.0 * edge_m / 0.03;
         let hidden = 0.5
@@ -264,13 +260,9 @@ fn eyes_that_move_are_spread_over_a_ball() {
         let at = Pose::translation(edge_m - 1.0, 0.0, -0.2);
         let cell = cell_with(BodyKind::Base, plate, at);
         let obstacles = Obstacles::new(&cell);
-        let seen = measure_sight(
-            &obstacles.robot(&Joints::zeros()),
-            &obstacles.surroundings(),
-            &Point3::origin(),
-            0.1,
-            &targets,
-        );
+        let eyes = Point3::origin();
+        let lines = OpenLines::new(&obstacles.surroundings(), &eyes, 0.1, &targets);
+        let seen = lines.past(&obstacles.robot(&Joints::zeros()));
         assert!(
             (seen.needle_fraction - free).abs() < SIGHT_ERROR,
             "{seen:?}"
@@ -340,7 +332,7 @@ fn what_the_surroundings_hide_is_not_taken_by_the_robot() {
     let seen = |cell: &Cell| {
         let obstacles = Obstacles::new(cell);
         let robot = obstacles.robot(&Joints::zeros());
-        measure_sight(&robot, &obstacles.surroundings(), &eye, 0.0, &targets)
+        OpenLines::new(&obstacles.surroundings(), &eye, 0.0, &targets).past(&robot)
     };
     let alone = seen(&cell);
     assert!(
