@@ -178,11 +178,12 @@ impl<'a> RoomModel<'a> {
         &self.obstacles
     }
 
-    /// By voxel of the goal's sector: whether arm or tool are nearer than the margin.
+    /// By voxel of the goal's sector: whether it counts, and arm or tool are nearer than the margin.
     pub fn taken(&self, goal: usize, q: &Joints) -> Vec<bool> {
-        self.obstacles
-            .robot(q)
-            .taken(&self.sector(goal).grid, FREE_MARGIN_M)
+        let sector = self.sector(goal);
+        let near = sector.taken_by(&self.obstacles.robot(q), FREE_MARGIN_M);
+        let near = near.iter().zip(&sector.inside);
+        near.map(|(near, counts)| *near && *counts).collect()
     }
 
     /// Entry of the guide as the arm holds it; z points along the insertion.

@@ -252,19 +252,34 @@ impl PlacedObstacles<'_> {
     /// The same as asking for every centre by itself. Blocks are decided at once where the distance
     /// of their middle says so: it changes by no more than one walks.
     pub fn taken(&self, grid: &VoxelGrid, margin_m: f64) -> Vec<bool> {
+        self.taken_of(grid, margin_m, &|_, _| true)
+    }
+
+    /// The same of the voxels that count; of others it is not said. `counts` is whether any voxel may, of those whose
+    /// centres are within a distance of a point.
+    pub(super) fn taken_of(
+        &self,
+        grid: &VoxelGrid,
+        margin_m: f64,
+        counts: &impl Fn(&Point3<f64>, f64) -> bool,
+    ) -> Vec<bool> {
         let mut taken = vec![false; grid.len()];
         let whole = Block {
             low: [0; 3],
             size: grid.cells,
         };
-        self.take(grid, margin_m, whole, &self.everything(), &mut taken);
+        let asked = Asked {
+            grid,
+            margin_m,
+            counts,
+        };
+        self.take(&asked, whole, &self.everything(), &mut taken);
         taken
     }
 
     fn take(
         &self,
-        grid: &VoxelGrid,
-        margin_m: f64,
+        asked: &Asked<'_, impl Fn(&Point3<f64>, f64) -> bool>,
         block: Block,
         near: &[usize],
         taken: &mut [bool],
@@ -272,7 +287,15 @@ impl PlacedObstacles<'_> {
         if block.size.contains(&0) {
             return;
         }
+        let Asked {
+            grid,
+            margin_m,
+            counts,
+        } = *asked;
         let (middle, half_m) = block.ball(grid);
+        if !counts(&middle, half_m) {
+            return;
+        }
         let (nearest, kept) = self.within(near, &middle, margin_m + half_m);
         let Some((distance_m, _)) = nearest else {
             return;
@@ -282,10 +305,17 @@ impl PlacedObstacles<'_> {
             block.for_each(grid, |index| taken[index] = true);
         } else if !is_voxel {
             for part in block.halves() {
-                self.take(grid, margin_m, part, &kept, taken);
+                self.take(asked, part, &kept, taken);
             }
         }
     }
+}
+
+/// Which voxels are asked for, and how near is near.
+struct Asked<'a, C> {
+    grid: &'a VoxelGrid,
+    margin_m: f64,
+    counts: &'a C,
 }
 
 /// A box of voxels.

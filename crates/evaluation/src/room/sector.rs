@@ -31,6 +31,29 @@ pub(super) const ABOVE: &str = "above";
 /// Regions with fewer voxels say nothing.
 const LEAST_VOXELS: usize = 100;
 
+/// The hemisphere by itself.
+struct HalfBall {
+    center_m: Point3<f64>,
+    outwards: Vector3<f64>,
+    radius_m: f64,
+}
+
+impl HalfBall {
+    /// Whether it holds what has an offset from its middle.
+    fn contains(&self, offset: &Vector3<f64>) -> bool {
+        offset.norm() <= self.radius_m && offset.dot(&self.outwards) > 0.0
+    }
+
+    /// Whether anything within a distance of a point may be in it.
+    fn may_meet(&self, middle: &Point3<f64>, within_m: f64) -> bool {
+        /// More than rounding, m.
+        const ROUNDING_M: f64 = 1e-9;
+        let offset = middle - self.center_m;
+        let reach_m = within_m + ROUNDING_M;
+        offset.norm() <= self.radius_m + reach_m && offset.dot(&self.outwards) > -reach_m
+    }
+}
+
 impl Sector {
     /// The hemisphere, less the voxels whose centre is in the surroundings.
     ///
@@ -46,7 +69,14 @@ impl Sector {
         sides: Option<&PatientSides>,
     ) -> Self {
         let grid = VoxelGrid::about(&center_m, radius_m, voxel_m);
-        let filled = surroundings.taken(&grid, 0.0);
+        let half_ball = HalfBall {
+            center_m,
+            outwards,
+            radius_m,
+        };
+        let filled = surroundings.taken_of(&grid, 0.0, &|middle, half_m| {
+            half_ball.may_meet(middle, half_m)
+        });
         let mut regions = vec![(ABOVE, Vector3::z())];
         if let Some(sides) = sides {
             regions.extend(
@@ -59,7 +89,7 @@ impl Sector {
         let mut region = Vec::with_capacity(grid.len());
         for (index, filled) in filled.iter().enumerate() {
             let offset = grid.center_m(index) - center_m;
-            inside.push(!filled && offset.norm() <= radius_m && offset.dot(&outwards) > 0.0);
+            inside.push(!filled && half_ball.contains(&offset));
             let along =
                 |(_, (_, direction)): &(usize, &(&str, Vector3<f64>))| offset.dot(direction);
             let most = regions
@@ -78,6 +108,18 @@ impl Sector {
             region,
             regions,
         }
+    }
+
+    /// By voxel that counts: whether solids are nearer than a margin.
+    pub(super) fn taken_by(&self, robot: &PlacedObstacles<'_>, margin_m: f64) -> Vec<bool> {
+        let half_ball = HalfBall {
+            center_m: self.center_m,
+            outwards: self.outwards,
+            radius_m: self.radius_m,
+        };
+        robot.taken_of(&self.grid, margin_m, &|middle, half_m| {
+            half_ball.may_meet(middle, half_m)
+        })
     }
 
     /// Share of the voxels that count for which `wanted` holds; 0 if none counts.

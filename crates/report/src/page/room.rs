@@ -65,15 +65,9 @@ pub(super) fn configuration(
     let lines = lines_of_sight(resolved, room, goal, &q);
     let sector = room.sector(goal);
     let taken = room.taken(goal, &q);
-    let set: Vec<bool> = sector
-        .inside
-        .iter()
-        .zip(&taken)
-        .map(|(inside, taken)| *inside && *taken)
-        .collect();
-    let surface = set
+    let surface = taken
         .contains(&true)
-        .then(|| surface(pack, &voxel_surface(&sector.grid, &set)));
+        .then(|| surface(pack, &voxel_surface(&sector.grid, &taken)));
     Some(json!({
         "sight": pack.f32s(lines),
         "taken": surface,

@@ -113,10 +113,8 @@ impl<'a> RoomPictures<'a> {
     fn add_space(&self, scene: &mut Scene, q: &Joints) {
         let sector = self.room.sector(self.goal);
         let taken = self.room.taken(self.goal, q);
-        let in_sector = sector.inside.iter().zip(&taken);
-        let set: Vec<bool> = in_sector.map(|(inside, taken)| *inside && *taken).collect();
         scene.surfaces.push(SurfaceInstance {
-            mesh: Arc::new(voxel_surface(&sector.grid, &set)),
+            mesh: Arc::new(voxel_surface(&sector.grid, &taken)),
             world_from_surface: Pose::identity(),
             color_rgba: TAKEN,
         });
