@@ -1,8 +1,12 @@
 //! Adaptive halving of a motion until every class is known to the tolerance.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 use needlebench_cell::{ClearanceClass, Frame};
-use needlebench_geometry::{MovingSolids, Placement, Separation, separation_within};
+use needlebench_geometry::{
+    BoundingCapsule, MovingSolids, Placement, Separation, separation_within,
+};
 use needlebench_kinematics::trajectory::Phase;
 
 use super::motion::{Motion, Span};
@@ -15,6 +19,58 @@ use super::{
 use crate::body::PlacedShape;
 use crate::model::{CLASS_COUNT, ClearanceModel, PairClearance};
 
+/// A solid as it moves relative to a body nearer to the base: the same for all that this body is made of.
+#[derive(Debug)]
+struct Mover<'m> {
+    solid: &'m PlacedShape,
+    link: usize,
+    /// Of the body that it is seen from; `None`: fixed in the world.
+    seen_from: Option<usize>,
+    moving: MovingSolid,
+}
+
+impl Mover<'_> {
+    /// First joint that moves it.
+    fn first_joint(&self) -> usize {
+        self.seen_from.map_or(0, |link| link + 1)
+    }
+
+    fn inner_from_outer(&self, posture: &Posture) -> Placement {
+        inner_from_outer(&posture.links, self.seen_from, self.link)
+    }
+
+    fn at(&self, posture: &Posture) -> Stand {
+        let inner_from_outer = self.inner_from_outer(posture);
+        Stand {
+            bound: self.solid.bound.placed(&inner_from_outer),
+            inner_from_outer,
+        }
+    }
+
+    fn bounds(&self, sweep: &Sweep<'_>) -> PointBounds {
+        sweep.point_bounds(&self.moving, self.solid, self.first_joint())
+    }
+
+    fn way_m(&self, sweep: &Sweep<'_>, points: &PointBounds) -> f64 {
+        sweep.way_m(&self.moving, self.solid, self.first_joint(), points)
+    }
+}
+
+/// Where a [`Mover`] stands in a posture, in the frame of the inner body.
+#[derive(Debug, Clone, Copy)]
+struct Stand {
+    inner_from_outer: Placement,
+    bound: BoundingCapsule,
+}
+
+/// A [`Mover`] over an interval.
+#[derive(Debug, Clone, Copy)]
+struct Course {
+    points: PointBounds,
+    /// At both ends.
+    ends: [Stand; 2],
+}
+
 /// Two solids of a pair, by who moves relative to whom.
 #[derive(Debug)]
 struct Couple<'m> {
@@ -24,24 +80,15 @@ struct Couple<'m> {
     inner: &'m PlacedShape,
     outer_solid: usize,
     inner_solid: usize,
-    outer_link: usize,
     /// `None`: fixed in the world.
     inner_link: Option<usize>,
-    moving: MovingSolid,
+    /// The outer solid, seen from the inner body.
+    mover: usize,
     /// The pair's body `a` is the inner one.
     swapped: bool,
 }
 
 impl Couple<'_> {
-    /// First joint that moves the outer solid relative to the inner one.
-    fn first_joint(&self) -> usize {
-        self.inner_link.map_or(0, |link| link + 1)
-    }
-
-    fn inner_from_outer(&self, posture: &Posture) -> Placement {
-        inner_from_outer(&posture.links, self.inner_link, self.outer_link)
-    }
-
     fn are_convex(&self) -> bool {
         self.outer.shape.is_convex() && self.inner.shape.is_convex()
     }
@@ -50,9 +97,8 @@ impl Couple<'_> {
     ///
     /// Without their balls, which [`capsule_gap_m`] does not know: bounds over shorter and shorter
     /// intervals tend to this one.
-    fn capsules_m(&self, inner_from_outer: &Placement) -> f64 {
-        let outer = self.outer.bound.placed(inner_from_outer);
-        outer.gap_m(&self.inner.bound)
+    fn capsules_m(&self, outer: &Stand) -> f64 {
+        outer.bound.gap_m(&self.inner.bound)
     }
 
     fn inner_solid_from_outer_solid(&self, inner_from_outer: &Placement) -> Placement {
@@ -91,12 +137,14 @@ impl Couple<'_> {
     }
 }
 
-fn couples(model: &ClearanceModel) -> Vec<Couple<'_>> {
+fn couples(model: &ClearanceModel) -> (Vec<Couple<'_>>, Vec<Mover<'_>>) {
     let link = |body: usize| match model.bodies[body].frame {
         Frame::World => None,
         Frame::Link(link) => Some(link),
     };
-    let mut couples = Vec::new();
+    let (mut couples, mut movers) = (Vec::new(), Vec::new());
+    // Movers of a body seen from another: the first of them.
+    let mut known = BTreeMap::new();
     for (pair, placed) in model.pairs.iter().enumerate() {
         // `None` is less than any link.
         let swapped = link(placed.a) < link(placed.b);
@@ -109,6 +157,17 @@ fn couples(model: &ClearanceModel) -> Vec<Couple<'_>> {
         let Some(outer_link) = link(outer) else {
             continue;
         };
+        let inner_link = link(inner);
+        let first = *known.entry((outer, inner_link)).or_insert_with(|| {
+            let solids = model.bodies[outer].solids.iter();
+            movers.extend(solids.map(|solid| Mover {
+                solid,
+                link: outer_link,
+                seen_from: inner_link,
+                moving: MovingSolid::new(&model.chain, outer_link, solid),
+            }));
+            movers.len() - model.bodies[outer].solids.len()
+        });
         for (outer_solid, moving) in model.bodies[outer].solids.iter().enumerate() {
             for (inner_solid, still) in model.bodies[inner].solids.iter().enumerate() {
                 couples.push(Couple {
@@ -118,15 +177,14 @@ fn couples(model: &ClearanceModel) -> Vec<Couple<'_>> {
                     inner: still,
                     outer_solid,
                     inner_solid,
-                    outer_link,
-                    inner_link: link(inner),
-                    moving: MovingSolid::new(&model.chain, outer_link, moving),
+                    inner_link,
+                    mover: first + outer_solid,
                     swapped,
                 });
             }
         }
     }
-    couples
+    (couples, movers)
 }
 
 /// What is known of a couple in an interval.
@@ -172,6 +230,7 @@ struct Search<'m, M> {
     length_scale: f64,
     chain: ChainBounds,
     couples: Vec<Couple<'m>>,
+    movers: Vec<Mover<'m>>,
     postures: Vec<Posture>,
     classes: [Option<ClassCertificate>; CLASS_COUNT],
     /// Clearances beyond this are not resolved, m.
@@ -190,13 +249,15 @@ pub(super) fn certify<M: Motion>(
     enough_m: [f64; CLASS_COUNT],
     length_scale: f64,
 ) -> MotionCertificate {
+    let (couples, movers) = couples(model);
     let mut search = Search {
         model,
         motion,
         options: *options,
         length_scale,
         chain: ChainBounds::new(&model.chain),
-        couples: couples(model),
+        couples,
+        movers,
         postures: Vec::new(),
         classes: [None; CLASS_COUNT],
         enough_m,
@@ -246,14 +307,15 @@ impl<M: Motion> Search<'_, M> {
             return Known::Capsules;
         }
         let [left_m, right_m] = [left, right].map(|posture| {
-            let placement = couple.inner_from_outer(&self.postures[posture]);
-            let capsules_m = couple.capsules_m(&placement);
+            let outer = self.movers[couple.mover].at(&self.postures[posture]);
+            let capsules_m = couple.capsules_m(&outer);
             // A bound that is beyond what is attained will do however short the interval.
             let attained_m = self.attained_m(couple.class);
             if capsules_m >= attained_m {
                 capsules_m
             } else {
-                let found = couple.separation_within(&placement, self.cutoff_m(attained_m));
+                let found =
+                    couple.separation_within(&outer.inner_from_outer, self.cutoff_m(attained_m));
                 found.map_or(attained_m, |separation| separation.distance_m)
             }
         });
@@ -350,18 +412,21 @@ impl<M: Motion> Search<'_, M> {
             && self.effort.intervals < MOST_INTERVALS;
         let deviation_rad = self.motion.chord_deviation(left_s, right_s);
         let mut open = Vec::new();
+        let mut courses: Vec<Option<Course>> = vec![None; self.movers.len()];
         for each in &interval.open {
-            let class = self.couples[each.couple].class;
+            let Couple { class, mover, .. } = self.couples[each.couple];
             let enough_m = self.attained_m(class) - self.options.tolerance_m;
             let (bound_m, way_m) = {
-                let sweep = Sweep::new(
-                    &self.postures[interval.left],
-                    &self.postures[interval.right],
-                    deviation_rad,
-                    &self.chain,
-                    self.length_scale,
-                );
-                self.bound(&sweep, interval, each, enough_m)
+                let ends = [interval.left, interval.right].map(|end| &self.postures[end]);
+                let sweep = Sweep::new(ends, deviation_rad, &self.chain, self.length_scale);
+                let course = courses[mover].get_or_insert_with(|| {
+                    let mover = &self.movers[mover];
+                    Course {
+                        points: mover.bounds(&sweep),
+                        ends: ends.map(|posture| mover.at(posture)),
+                    }
+                });
+                self.bound(&sweep, course, each, enough_m)
             };
             let is_closed = bound_m >= enough_m
                 // Two surfaces that cross: their depth need not follow the motion smoothly.
@@ -411,13 +476,13 @@ impl<M: Motion> Search<'_, M> {
                 };
                 postures[sample] = Some(posture);
                 let couple = &self.couples[closed.couple];
-                let placement = couple.inner_from_outer(&self.postures[posture]);
+                let outer = self.movers[couple.mover].at(&self.postures[posture]);
                 let attained_m = self.attained_m(class);
-                if couple.capsules_m(&placement) < attained_m {
+                if couple.capsules_m(&outer) < attained_m {
                     self.distance_within(
                         closed.couple,
                         posture,
-                        &placement,
+                        &outer.inner_from_outer,
                         closed.phase,
                         attained_m,
                     );
@@ -428,33 +493,35 @@ impl<M: Motion> Search<'_, M> {
 
     /// Lower bound of a couple's clearance over an interval, and its way in it, m. The bound need not be the
     /// best where it is enough.
-    fn bound(
-        &self,
-        sweep: &Sweep<'_>,
-        interval: &Interval,
-        open: &Open,
-        enough_m: f64,
-    ) -> (f64, f64) {
+    fn bound(&self, sweep: &Sweep<'_>, course: &Course, open: &Open, enough_m: f64) -> (f64, f64) {
         let couple = &self.couples[open.couple];
-        let first = couple.first_joint();
-        let points = sweep.point_bounds(&couple.moving, couple.outer, first);
+        let points = &course.points;
         let lost_m = points.deviation_m + ROUNDING_M;
         match &open.known {
-            Known::Capsules => (
-                self.by_capsules_m(couple, interval, &points) - lost_m,
-                f64::INFINITY,
-            ),
+            Known::Capsules => {
+                let attained = self.classes[couple.class as usize].as_ref();
+                let attained_m =
+                    attained.map_or(f64::INFINITY, |known| known.attained.separation.distance_m);
+                let far_m = far_m(couple, course) - lost_m;
+                // No class is nearer than what it has attained: a bound beyond that is not its least.
+                let bound_m = if far_m > attained_m + ROUNDING_M {
+                    far_m
+                } else {
+                    by_capsules_m(couple, course) - lost_m
+                };
+                (bound_m, f64::INFINITY)
+            }
             Known::Planes([(_, one), (_, two)]) => (
                 one.least_of_larger_m(two, points.curvature_m) - lost_m,
                 f64::INFINITY,
             ),
             Known::Ends(ends) => {
-                let way_m = sweep.way_m(&couple.moving, couple.outer, first, &points);
+                let way_m = self.movers[couple.mover].way_m(sweep, points);
                 let mut bound_m = 0.5 * (ends.left_m + ends.right_m - way_m) - lost_m;
                 if couple.are_convex() || bound_m > 0.0 && bound_m >= enough_m {
                     return (bound_m, way_m);
                 }
-                let around_m = self.by_capsules_m(couple, interval, &points) - lost_m;
+                let around_m = by_capsules_m(couple, course) - lost_m;
                 if bound_m <= 0.0 || around_m >= enough_m {
                     bound_m = around_m;
                 }
@@ -464,57 +531,12 @@ impl<M: Motion> Search<'_, M> {
                     let least_m = enough_m.max(0.0) + lost_m;
                     let attained_m = self.attained_m(couple.class).max(0.0) + lost_m;
                     let aim_m = attained_m.max(least_m);
-                    let found = self.by_surfaces_m(couple, interval, &points, aim_m, least_m);
+                    let found = by_surfaces_m(couple, course, aim_m, least_m);
                     bound_m = found.map_or(bound_m, |found_m| bound_m.max(found_m - lost_m));
                 }
                 (bound_m, way_m + points.deviation_m)
             }
         }
-    }
-
-    /// The same part by part of their surfaces, as far as it is at least `least_m`; parts that keep `aim_m`
-    /// are not looked into.
-    fn by_surfaces_m(
-        &self,
-        couple: &Couple<'_>,
-        interval: &Interval,
-        points: &PointBounds,
-        aim_m: f64,
-        least_m: f64,
-    ) -> Option<f64> {
-        let solids = MovingSolids {
-            a: &couple.outer.shape,
-            b: &couple.inner.shape,
-            b_from_a: [interval.left, interval.right].map(|posture| {
-                let placement = couple.inner_from_outer(&self.postures[posture]);
-                couple.inner_solid_from_outer_solid(&placement)
-            }),
-        };
-        solids.least_gap_m(aim_m, least_m, |one, two| {
-            let [one, two] = [one, two].map(|[left_m, right_m]| Gaps { left_m, right_m });
-            one.least_of_larger_m(&two, points.curvature_m)
-        })
-    }
-
-    /// The same by the capsules around both solids, in the directions in which they see each
-    /// other at the ends.
-    fn by_capsules_m(&self, couple: &Couple<'_>, interval: &Interval, points: &PointBounds) -> f64 {
-        let inner = &couple.inner.bound;
-        let outer = [interval.left, interval.right].map(|posture| {
-            let placement = couple.inner_from_outer(&self.postures[posture]);
-            couple.outer.bound.placed(&placement)
-        });
-        let [one, two] = outer.map(|seen| {
-            let normal = inner
-                .towards(&seen)
-                .try_normalize(0.0)
-                .unwrap_or_else(Vector3::z);
-            Gaps {
-                left_m: capsule_gap_m(&normal, &outer[0], inner),
-                right_m: capsule_gap_m(&normal, &outer[1], inner),
-            }
-        });
-        one.least_of_larger_m(&two, points.curvature_m)
     }
 
     /// Looks at the posture in the middle and hands the open couples to both halves.
@@ -529,8 +551,12 @@ impl<M: Motion> Search<'_, M> {
                 phase: interval.phase,
                 open: Vec::with_capacity(open.len()),
             });
+        let mut stands: Vec<Option<Stand>> = vec![None; self.movers.len()];
         for each in open {
-            let known = self.look(interval, middle, each);
+            let mover = self.couples[each.couple].mover;
+            let outer =
+                stands[mover].get_or_insert_with(|| self.movers[mover].at(&self.postures[middle]));
+            let known = self.look(interval, middle, each, outer);
             for (half, known) in halves.iter_mut().zip(known) {
                 half.open.push(Open {
                     couple: each.couple,
@@ -542,18 +568,24 @@ impl<M: Motion> Search<'_, M> {
     }
 
     /// What is known of a couple in both halves once its middle has been looked at.
-    fn look(&mut self, interval: &Interval, middle: usize, open: &Open) -> [Known; 2] {
+    fn look(
+        &mut self,
+        interval: &Interval,
+        middle: usize,
+        open: &Open,
+        outer: &Stand,
+    ) -> [Known; 2] {
         let couple = &self.couples[open.couple];
-        let placement = couple.inner_from_outer(&self.postures[middle]);
+        let placement = &outer.inner_from_outer;
         let attained_m = self.attained_m(couple.class);
         match open.known {
             Known::Capsules => {
                 // Farther than the nearest: shorter intervals do, without a distance.
-                if couple.capsules_m(&placement) >= attained_m {
+                if couple.capsules_m(outer) >= attained_m {
                     return [Known::Capsules; 2];
                 }
-                let separation = self.distance(open.couple, middle, &placement, interval.phase);
-                match self.plane(open.couple, interval, &placement, &separation) {
+                let separation = self.distance(open.couple, middle, placement, interval.phase);
+                match self.plane(open.couple, interval, placement, &separation) {
                     None => [Known::Capsules; 2],
                     Some((plane, middle_m, ends)) => [
                         Known::Planes([(plane, ends.left_half(middle_m)); 2]),
@@ -565,7 +597,7 @@ impl<M: Motion> Search<'_, M> {
                 self.effort.planes += 2;
                 let middles_m = planes
                     .each_mut()
-                    .map(|(plane, _)| plane.gap_m(couple.outer, &placement));
+                    .map(|(plane, _)| plane.gap_m(couple.outer, placement));
                 let halves = [0, 1].map(|i| {
                     let (plane, gaps) = planes[i];
                     [
@@ -581,9 +613,9 @@ impl<M: Motion> Search<'_, M> {
                 if middles_m[0].max(middles_m[1]) >= attained_m {
                     return kept;
                 }
-                let separation = self.distance(open.couple, middle, &placement, interval.phase);
+                let separation = self.distance(open.couple, middle, placement, interval.phase);
                 let Some((plane, middle_m, ends)) =
-                    self.plane(open.couple, interval, &placement, &separation)
+                    self.plane(open.couple, interval, placement, &separation)
                 else {
                     return kept;
                 };
@@ -598,7 +630,7 @@ impl<M: Motion> Search<'_, M> {
                 ]
             }
             Known::Ends(ends) => {
-                let mut middle_m = couple.capsules_m(&placement);
+                let mut middle_m = couple.capsules_m(outer);
                 let may_do = match self.options.bound {
                     MotionBound::Planes => middle_m >= attained_m,
                     MotionBound::Lipschitz => {
@@ -610,7 +642,7 @@ impl<M: Motion> Search<'_, M> {
                     let cutoff_m = self.cutoff_m(attained_m);
                     let phase = interval.phase;
                     let found =
-                        self.distance_within(open.couple, middle, &placement, phase, cutoff_m);
+                        self.distance_within(open.couple, middle, placement, phase, cutoff_m);
                     middle_m = found.map_or(attained_m, |separation| separation.distance_m);
                 }
                 [
@@ -668,12 +700,59 @@ impl<M: Motion> Search<'_, M> {
         let normal = (-separation.normal.into_inner()).try_normalize(0.5)?;
         let mut plane = Plane::across(normal, couple.inner);
         let middle_m = plane.gap_m(couple.outer, inner_from_outer);
+        let mover = &self.movers[couple.mover];
         let [left_m, right_m] = [interval.left, interval.right].map(|posture| {
-            let placement = couple.inner_from_outer(&self.postures[posture]);
+            let placement = mover.inner_from_outer(&self.postures[posture]);
             plane.gap_m(couple.outer, &placement)
         });
         Some((plane, middle_m, Gaps { left_m, right_m }))
     }
+}
+
+/// Lower bound of a couple's clearance part by part of their surfaces, as far as it is at least `least_m`, without
+/// what is off the chord; parts that keep `aim_m` are not looked into.
+fn by_surfaces_m(couple: &Couple<'_>, course: &Course, aim_m: f64, least_m: f64) -> Option<f64> {
+    let solids = MovingSolids {
+        a: &couple.outer.shape,
+        b: &couple.inner.shape,
+        b_from_a: course
+            .ends
+            .map(|end| couple.inner_solid_from_outer_solid(&end.inner_from_outer)),
+    };
+    solids.least_gap_m(aim_m, least_m, |one, two| {
+        let [one, two] = [one, two].map(|[left_m, right_m]| Gaps { left_m, right_m });
+        one.least_of_larger_m(&two, course.points.curvature_m)
+    })
+}
+
+/// The same by the capsules around both solids, in the directions in which they see each other at the ends.
+fn by_capsules_m(couple: &Couple<'_>, course: &Course) -> f64 {
+    let inner = &couple.inner.bound;
+    let [left, right] = &course.ends;
+    let [one, two] = [left, right].map(|seen| {
+        let normal = inner
+            .towards(&seen.bound)
+            .try_normalize(0.0)
+            .unwrap_or_else(Vector3::z);
+        Gaps {
+            left_m: capsule_gap_m(&normal, &left.bound, inner),
+            right_m: capsule_gap_m(&normal, &right.bound, inner),
+        }
+    });
+    one.least_of_larger_m(&two, course.points.curvature_m)
+}
+
+/// What [`by_capsules_m`] is at least, by the balls around the capsules and the way of the outer one: seen along the
+/// direction at one end, a gap falls by no more than that way.
+fn far_m(couple: &Couple<'_>, course: &Course) -> f64 {
+    let inner = &couple.inner.bound;
+    let [left, right] = course.ends.each_ref().map(|end| &end.bound);
+    let apart_m = (left.centre - inner.centre)
+        .norm()
+        .min((right.centre - inner.centre).norm());
+    let radii_m = [left, inner].map(|each| each.half_axis.norm() + each.radius_m);
+    let way_m = (right.centre - left.centre).norm() + (right.half_axis - left.half_axis).norm();
+    apart_m - radii_m[0] - radii_m[1] - 0.5 * way_m - 0.125 * course.points.curvature_m
 }
 
 /// Whether a class counts in a phase: needle and hand come only when the guide stands in its

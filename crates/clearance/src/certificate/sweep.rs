@@ -121,8 +121,7 @@ pub(super) struct PointBounds {
 
 impl<'p> Sweep<'p> {
     pub fn new(
-        left: &'p Posture,
-        right: &'p Posture,
+        [left, right]: [&'p Posture; 2],
         deviation_rad: Joints,
         bounds: &'p ChainBounds,
         length_scale: f64,
