@@ -16,6 +16,9 @@ const BRISTLE_STEP_S: f64 = 1e-3;
 /// rest is `exp(-10)`.
 const FORGOTTEN_WAYS: f64 = 10.0;
 
+/// Nats by which a bend has decayed before what is left of it is below the last bit of a double.
+const UNFELT_NATS: f64 = 40.0;
+
 /// Share of the way over which bristles bend that is one step: steps of one direction are taken together up to that.
 const FINE: f64 = 1.0 / 16.0;
 
@@ -63,8 +66,7 @@ pub fn resting_friction(friction: &JointFriction, trajectory: &JointTrajectory) 
         reason = "durations are seconds"
     )]
     let steps = (trajectory.duration_s() / BRISTLE_STEP_S).ceil() as usize;
-    for k in 0..=steps {
-        let speed = trajectory.sample(k as f64 * BRISTLE_STEP_S).velocity;
+    for speed in felt_velocities(friction, trajectory, steps) {
         for i in 0..JOINT_COUNT {
             let v = speed[i];
             if JointFriction::direction(v) == 0.0 {
@@ -80,30 +82,76 @@ pub fn resting_friction(friction: &JointFriction, trajectory: &JointTrajectory) 
                 friction.compensation * (slip_nm.copysign(v) + friction.viscous_nms_per_rad[i] * v);
         }
     }
+    let mut positions = Positions {
+        trajectory,
+        steps,
+        backwards: Vec::new(),
+    };
     RestingFriction {
         held_nm: bristles.component_mul(&friction.bristle_stiffness_nm_per_rad),
         compensated_nm,
-        late: std::array::from_fn(|joint| LateTurn::of(friction, trajectory, joint, steps)),
+        late: std::array::from_fn(|joint| LateTurn::of(friction, &mut positions, joint)),
+    }
+}
+
+/// Velocities of the steps that the bristles still feel at the end of the motion: what they held before has decayed by
+/// [`UNFELT_NATS`] in every joint.
+fn felt_velocities(
+    friction: &JointFriction,
+    trajectory: &JointTrajectory,
+    steps: usize,
+) -> impl Iterator<Item = Joints> {
+    // A step of `v` leaves `1 / (1 + v dt k / F(v))` of a bend.
+    let most_nm = friction.stiction_nm.sup(&friction.coulomb_nm);
+    let mut left_nats = [UNFELT_NATS; JOINT_COUNT];
+    let mut backwards = Vec::new();
+    for k in (0..=steps).rev() {
+        let speed = trajectory.sample(k as f64 * BRISTLE_STEP_S).velocity;
+        backwards.push(speed);
+        for (i, left) in left_nats.iter_mut().enumerate() {
+            if JointFriction::direction(speed[i]) != 0.0 {
+                let stiffness = friction.bristle_stiffness_nm_per_rad[i];
+                let bends = BRISTLE_STEP_S * stiffness * speed[i].abs() / most_nm[i];
+                *left -= libm::log1p(bends);
+            }
+        }
+        if left_nats.iter().all(|&left| left <= 0.0) {
+            break;
+        }
+    }
+    backwards.into_iter().rev()
+}
+
+/// Positions of the reference step by step, sampled from the end as far as they are asked for.
+struct Positions<'t> {
+    trajectory: &'t JointTrajectory,
+    steps: usize,
+    backwards: Vec<Joints>,
+}
+
+impl Positions<'_> {
+    fn at(&mut self, k: usize, joint: usize) -> f64 {
+        while self.backwards.len() <= self.steps - k {
+            let k = self.steps - self.backwards.len();
+            let time_s = (k as f64 * BRISTLE_STEP_S).min(self.trajectory.duration_s());
+            self.backwards.push(self.trajectory.sample(time_s).position);
+        }
+        self.backwards[self.steps - k][joint]
     }
 }
 
 impl LateTurn {
     /// The last part of a joint's way, if it did not go on in one direction until its bristles' bend was complete.
-    fn of(
-        friction: &JointFriction,
-        trajectory: &JointTrajectory,
-        joint: usize,
-        steps: usize,
-    ) -> Option<Self> {
+    fn of(friction: &JointFriction, positions: &mut Positions<'_>, joint: usize) -> Option<Self> {
+        let Positions {
+            trajectory, steps, ..
+        } = *positions;
         let stiffness = friction.bristle_stiffness_nm_per_rad[joint];
         let bend_rad = friction.stiction_nm[joint] / stiffness;
         if !(bend_rad > 0.0 && bend_rad.is_finite()) {
             return None;
         }
-        let position = |k: usize| {
-            let time_s = (k as f64 * BRISTLE_STEP_S).min(trajectory.duration_s());
-            trajectory.sample(time_s).position[joint]
-        };
+        let mut position = |k: usize| positions.at(k, joint);
         // Backwards to where it had gone on in one direction for long enough.
         let enough_rad = FORGOTTEN_WAYS * bend_rad;
         let (mut from, mut after, mut gone_rad) = (steps, position(steps), 0.0_f64);

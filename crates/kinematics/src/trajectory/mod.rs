@@ -358,7 +358,8 @@ const PIECE_SAMPLES: usize = 64;
 
 fn path_time_scale(path: &JointPath, profile: &DoubleS, limits: &MotionLimits) -> f64 {
     let samples = PATH_SAMPLES.max(PIECE_SAMPLES * path.intervals());
-    let mut scale: f64 = 1.0;
+    // Roots of the largest ratios are the largest roots: both rise, and are rounded correctly.
+    let (mut of_velocity, mut of_acceleration, mut of_jerk) = (1.0_f64, 1.0_f64, 1.0_f64);
     for k in 0..=samples {
         let t = profile.duration_s() * k as f64 / samples as f64;
         let along = profile.sample(t);
@@ -368,13 +369,14 @@ fn path_time_scale(path: &JointPath, profile: &DoubleS, limits: &MotionLimits) -
         let acceleration = point.second * v.powi(2) + point.first * a;
         let jerk = point.third * v.powi(3) + point.second * (3.0 * v * a) + point.first * j;
         for i in 0..JOINT_COUNT {
-            scale = scale
-                .max(velocity[i].abs() / limits.velocity[i])
-                .max((acceleration[i].abs() / limits.acceleration[i]).sqrt())
-                .max(libm::cbrt(jerk[i].abs() / limits.jerk[i]));
+            of_velocity = of_velocity.max(velocity[i].abs() / limits.velocity[i]);
+            of_acceleration = of_acceleration.max(acceleration[i].abs() / limits.acceleration[i]);
+            of_jerk = of_jerk.max(jerk[i].abs() / limits.jerk[i]);
         }
     }
-    scale
+    of_velocity
+        .max(of_acceleration.sqrt())
+        .max(libm::cbrt(of_jerk))
 }
 
 #[cfg(test)]
