@@ -32,25 +32,22 @@ pub struct Structure {
 /// Words, all of which a name has; the structure that it is of; what that is. The first row that fits counts.
 const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
     (&["nodule"], "", SurfaceTissue::Lesion),
-    (&["nodules"], "", SurfaceTissue::Lesion),
     (&["tumor"], "", SurfaceTissue::Lesion),
     (&["tumour"], "", SurfaceTissue::Lesion),
     (&["lesion"], "", SurfaceTissue::Lesion),
-    (&["lung", "vessels"], "lung_vessels", SurfaceTissue::Vessel),
+    (&["lung", "vessel"], "lung_vessels", SurfaceTissue::Vessel),
     (&["lung", "trachea"], "trachea", SurfaceTissue::Organ),
     (&["lung", "left"], "lung_left", SurfaceTissue::Lung),
     (&["lung", "right"], "lung_right", SurfaceTissue::Lung),
     (&["lobe", "left"], "lung_left", SurfaceTissue::Lung),
     (&["lobe", "right"], "lung_right", SurfaceTissue::Lung),
-    (&["skin"], "skin", SurfaceTissue::Skin),
-    (&["body"], "skin", SurfaceTissue::Skin),
-    (&["external"], "skin", SurfaceTissue::Skin),
+    (&["spinal", "cord"], "spinal_cord", SurfaceTissue::Organ),
+    (&["vertebral", "artery"], "arteries", SurfaceTissue::Vessel),
     (&["vertebra"], "vertebrae", SurfaceTissue::Bone),
-    (&["vertebrae"], "vertebrae", SurfaceTissue::Bone),
+    (&["vertebral"], "vertebrae", SurfaceTissue::Bone),
     (&["spine"], "vertebrae", SurfaceTissue::Bone),
     (&["sacrum"], "sacrum", SurfaceTissue::Bone),
     (&["rib"], "ribs", SurfaceTissue::Bone),
-    (&["ribs"], "ribs", SurfaceTissue::Bone),
     (&["costal"], "costal_cartilages", SurfaceTissue::Bone),
     (&["sternum"], "sternum", SurfaceTissue::Bone),
     (&["scapula", "left"], "scapula_left", SurfaceTissue::Bone),
@@ -69,8 +66,16 @@ const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
     ),
     (&["humerus", "left"], "humerus_left", SurfaceTissue::Bone),
     (&["humerus", "right"], "humerus_right", SurfaceTissue::Bone),
+    (&["femur"], "femurs", SurfaceTissue::Bone),
+    (&["hip", "implant"], "implants", SurfaceTissue::Bone),
     (&["hip"], "hips", SurfaceTissue::Bone),
+    (&["pelvis"], "hips", SurfaceTissue::Bone),
     (&["skull"], "skull", SurfaceTissue::Bone),
+    (&["mandible"], "skull", SurfaceTissue::Bone),
+    (&["radius"], "forearms", SurfaceTissue::Bone),
+    (&["ulna"], "forearms", SurfaceTissue::Bone),
+    (&["carpal"], "hands", SurfaceTissue::Bone),
+    (&["metacarpal"], "hands", SurfaceTissue::Bone),
     (&["bone"], "bone", SurfaceTissue::Bone),
     (&["aorta"], "aorta", SurfaceTissue::Vessel),
     (
@@ -116,10 +121,13 @@ const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
         SurfaceTissue::Vessel,
     ),
     (&["iliac", "vena"], "iliac_veins", SurfaceTissue::Vessel),
+    (&["iliac", "vein"], "iliac_veins", SurfaceTissue::Vessel),
+    (&["iliac", "crest"], "hips", SurfaceTissue::Bone),
+    (&["iliac"], "iliac_vessels", SurfaceTissue::Vessel),
+    (&["vena", "cava"], "venae_cavae", SurfaceTissue::Vessel),
     (&["artery"], "arteries", SurfaceTissue::Vessel),
     (&["vein"], "veins", SurfaceTissue::Vessel),
     (&["vessel"], "vessels", SurfaceTissue::Vessel),
-    (&["vessels"], "vessels", SurfaceTissue::Vessel),
     (&["heart"], "heart", SurfaceTissue::Organ),
     (&["atrial"], "heart", SurfaceTissue::Organ),
     (&["atrium"], "heart", SurfaceTissue::Organ),
@@ -127,7 +135,6 @@ const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
     (&["myocardium"], "heart", SurfaceTissue::Organ),
     (&["trachea"], "trachea", SurfaceTissue::Organ),
     (&["airway"], "trachea", SurfaceTissue::Organ),
-    (&["airways"], "trachea", SurfaceTissue::Organ),
     (&["bronchus"], "trachea", SurfaceTissue::Organ),
     (&["bronchi"], "trachea", SurfaceTissue::Organ),
     (&["bronchie"], "trachea", SurfaceTissue::Organ),
@@ -145,7 +152,58 @@ const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
     (&["colon"], "colon", SurfaceTissue::Organ),
     (&["duodenum"], "duodenum", SurfaceTissue::Organ),
     (&["bowel"], "bowel", SurfaceTissue::Organ),
-    (&["spinal", "cord"], "spinal_cord", SurfaceTissue::Organ),
+    (&["bladder"], "bladder", SurfaceTissue::Organ),
+    (&["diaphragm"], "diaphragm", SurfaceTissue::Organ),
+    (&["pericardium"], "heart", SurfaceTissue::Organ),
+    (&["brain"], "brain", SurfaceTissue::Organ),
+];
+
+/// Words of which the name of the body's outside consists: `body_trunc`, `External`. One with another word is
+/// something in the body, such as the body of a vertebra or an external artery.
+const OUTSIDE: &[&str] = &[
+    "body",
+    "contour",
+    "external",
+    "extremities",
+    "outer",
+    "outline",
+    "patient",
+    "skin",
+    "surface",
+    "trunc",
+    "trunk",
+    "whole",
+];
+/// Those that make a name one of the outside.
+const IS_OUTSIDE: &[&str] = &["body", "external", "skin"];
+
+/// Plurals, and the words of the table.
+const PLURALS: &[(&str, &str)] = &[
+    ("airways", "airway"),
+    ("arteries", "artery"),
+    ("bones", "bone"),
+    ("carpals", "carpal"),
+    ("clavicles", "clavicle"),
+    ("femora", "femur"),
+    ("femurs", "femur"),
+    ("hips", "hip"),
+    ("humeri", "humerus"),
+    ("kidneys", "kidney"),
+    ("lesions", "lesion"),
+    ("lobes", "lobe"),
+    ("lungs", "lung"),
+    ("metacarpals", "metacarpal"),
+    ("nodules", "nodule"),
+    ("ribs", "rib"),
+    ("scapulae", "scapula"),
+    ("scapulas", "scapula"),
+    ("tumors", "tumor"),
+    ("tumours", "tumour"),
+    ("veins", "vein"),
+    ("ventricles", "ventricle"),
+    ("vertebrae", "vertebra"),
+    ("vertebras", "vertebra"),
+    ("vessels", "vessel"),
 ];
 
 /// What a name of 3D Slicer, TotalSegmentator or this program stands for; none if it is not known.
@@ -153,22 +211,35 @@ const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
 /// Names are taken apart into words of letters; `l` and `r` stand for left and right. A lesion keeps its name.
 pub fn structure_of(name: &str) -> Option<Structure> {
     let lower = name.to_lowercase();
-    let words: Vec<&str> = lower
+    let written: Vec<&str> = lower
         .split(|c: char| !c.is_alphabetic())
-        .map(|word| match word {
+        .filter(|word| !word.is_empty())
+        .collect();
+    let words: Vec<&str> = written
+        .iter()
+        .map(|&word| match word {
             "l" => "left",
             "r" => "right",
-            "lungs" => "lung",
-            other => other,
+            _ => PLURALS
+                .iter()
+                .find(|(plural, _)| *plural == word)
+                .map_or(word, |(_, one)| one),
         })
         .collect();
+    if words.iter().any(|word| IS_OUTSIDE.contains(word))
+        && words.iter().all(|word| OUTSIDE.contains(word))
+    {
+        return Some(Structure {
+            name: "skin".to_owned(),
+            tissue: SurfaceTissue::Skin,
+        });
+    }
     let (_, structure, tissue) = TABLE
         .iter()
         .find(|(wanted, _, _)| wanted.iter().all(|word| words.contains(word)))?;
     let name = match *tissue {
-        SurfaceTissue::Lesion => words
+        SurfaceTissue::Lesion => written
             .iter()
-            .filter(|word| !word.is_empty())
             .copied()
             .chain(digits(&lower))
             .collect::<Vec<_>>()
@@ -213,12 +284,40 @@ mod tests {
             ("Liver", "liver", SurfaceTissue::Organ),
             ("lung_nodules", "lung_nodules", SurfaceTissue::Lesion),
             ("lesion 2", "lesion_2", SurfaceTissue::Lesion),
+            ("vertebrae_body", "vertebrae", SurfaceTissue::Bone),
+            ("Vertebral body L1", "vertebrae", SurfaceTissue::Bone),
+            ("body_extremities", "skin", SurfaceTissue::Skin),
+            ("External", "skin", SurfaceTissue::Skin),
+            ("external iliac", "iliac_vessels", SurfaceTissue::Vessel),
+            (
+                "external carotid artery",
+                "carotid_arteries",
+                SurfaceTissue::Vessel,
+            ),
+            ("Lungs_R", "lung_right", SurfaceTissue::Lung),
+            ("Kidneys left", "kidney_left", SurfaceTissue::Organ),
+            (
+                "portal_vein_and_splenic_vein",
+                "portal_veins",
+                SurfaceTissue::Vessel,
+            ),
+            ("coronary_arteries", "arteries", SurfaceTissue::Vessel),
+            ("lung vessels", "lung_vessels", SurfaceTissue::Vessel),
+            ("urinary_bladder", "bladder", SurfaceTissue::Organ),
+            ("femur_left", "femurs", SurfaceTissue::Bone),
         ] {
             let structure = structure_of(name);
             let found = structure.map(|found| (found.name, found.tissue));
             assert_eq!(found, Some((wanted.to_owned(), tissue)), "{name}");
         }
-        for name in ["", "autochthon_left", "air", "face"] {
+        for name in [
+            "",
+            "autochthon_left",
+            "air",
+            "face",
+            "external oblique",
+            "lung",
+        ] {
             assert_eq!(structure_of(name), None, "{name}");
         }
     }
