@@ -14,6 +14,7 @@ mod grid;
 mod histogram;
 mod image_circle;
 mod in_slices;
+mod label_map;
 pub mod markers;
 mod mask;
 mod morphology;

@@ -11,13 +11,13 @@ use serde::Serialize;
 
 use crate::error::{ImagingError, Remark};
 use crate::grid::VoxelGrid;
+use crate::label_map::{Given, complete, completed_labels, given_structures, is_solid};
 use crate::mask::{IndexBox, Mask};
 use crate::segment::{
-    FIRST_LESION, LabelFacts, Lesion, LesionSeed, Levels, Segmentation, Side, grow_lesion,
-    label_facts, label_map, paint, segment,
+    LabelFacts, Lesion, LesionSeed, Levels, Segmentation, grow_lesion, label_map, segment,
 };
 use crate::spacing::{orthogonal, whole};
-use crate::structures::{Structure, SurfaceTissue, structure_of};
+use crate::structures::SurfaceTissue;
 use crate::surface::{
     Field, Level, SurfaceError, Values, at_middles, local_level, refine, simplify, sound,
     surface_error, surface_net,
@@ -171,23 +171,27 @@ pub fn reconstruct(
     progress("tissues", 0.0);
     let mut found = segment(volume, &options.levels, cancel)?;
     let mut remarks = std::mem::take(&mut found.remarks);
-    let given = match &options.labels {
+    let mut given = match &options.labels {
         Some(map) => given_structures(map, &volume.grid, &mut remarks)?,
         None => Vec::new(),
     };
-    take_over(&mut found, &given);
+    given.retain(|each| is_solid(each, &found, &volume.grid, &mut remarks));
+    let other_bone = complete(&mut found, &given, &volume.grid, &mut remarks)?;
     progress("lesions", 0.3);
     let mut lesions = Vec::with_capacity(options.lesions.len());
     for seed in &options.lesions {
         lesions.push(grow_lesion(volume, &found, seed, cancel, &mut remarks)?);
     }
     progress("surfaces", 0.4);
-    let jobs = jobs(&found, &given, &lesions, options);
+    let jobs = jobs(&found, &given, other_bone.as_ref(), &lesions, options);
     let made = make_all(volume, &jobs, threads, cancel, progress)?;
     let (mut surfaces, sizes) = sort(made, &jobs, lesions.len(), &mut remarks);
     keep_within_skin(&mut surfaces, &mut remarks);
     progress("label map", 0.95);
-    let (labels, facts) = labels(volume, &found, &lesions, options);
+    let (labels, facts) = match &options.labels {
+        Some(given) => completed_labels(volume, &found, &lesions, given),
+        None => label_map(volume, &found, &lesions),
+    };
     let lesions = lesions.into_iter().zip(sizes);
     Ok(Reconstruction {
         labels,
@@ -201,132 +205,8 @@ pub fn reconstruct(
     })
 }
 
-/// A structure of a label map from elsewhere.
-struct Given {
-    structure: Structure,
-    bounds: IndexBox,
-    mask: Mask,
-}
-
-/// Structures that a label map names, each with all its labels.
-fn given_structures(
-    map: &LabelMap,
-    grid: &VoxelGrid,
-    remarks: &mut Vec<Remark>,
-) -> Result<Vec<Given>, ImagingError> {
-    check_same_grid(&map.grid, grid)?;
-    let mut structures: BTreeMap<String, (Structure, Vec<u16>)> = BTreeMap::new();
-    let mut unknown = Vec::new();
-    for (label, name) in &map.names {
-        match structure_of(name) {
-            Some(structure) => {
-                let entry = structures.entry(structure.name.clone());
-                entry.or_insert((structure, Vec::new())).1.push(*label);
-            }
-            None => unknown.push(format!("{label} `{name}`")),
-        }
-    }
-    if !unknown.is_empty() {
-        remarks.push(
-            Remark::new(format!(
-                "labels without a known meaning are ignored: {}",
-                unknown.join(", ")
-            ))
-            .at("label map"),
-        );
-    }
-    let mut given = Vec::new();
-    for (structure, labels) in structures.into_values() {
-        let mut wanted = vec![false; 1 << 16];
-        for label in labels {
-            wanted[usize::from(label)] = true;
-        }
-        let mask = Mask::of(grid.size(), &map.labels, |label| wanted[usize::from(label)]);
-        if let Some(bounds) = mask.bounds() {
-            given.push(Given {
-                structure,
-                mask: mask.cropped(&bounds),
-                bounds,
-            });
-        }
-    }
-    Ok(given)
-}
-
-/// First number of what was found beside a label map from elsewhere, unless that uses it.
-const FIRST_OWN: u16 = 1000;
-
-/// A hundredth of a voxel at the corners: what rounding of headers to single precision leaves.
-const SAME_PLACE: f64 = 0.01;
-
-fn check_same_grid(map: &VoxelGrid, volume: &VoxelGrid) -> Result<(), ImagingError> {
-    let hint =
-        "resample the label map to the volume (3D Slicer: Resample Image, with nearest neighbour)";
-    if map.size() != volume.size() {
-        let words = |[i, j, k]: [usize; 3]| format!("{i} x {j} x {k}");
-        return Err(ImagingError::refused(format!(
-            "it has {} voxels, the volume {}",
-            words(map.size()),
-            words(volume.size())
-        ))
-        .at("label map")
-        .hint(hint));
-    }
-    let spacing_m = volume.spacing_m().into_iter().fold(f64::INFINITY, f64::min);
-    for corner in 0..8_usize {
-        let index = Point3::from([0, 1, 2].map(|axis| {
-            if corner >> axis & 1 == 1 {
-                volume.size()[axis] as f64 - 1.0
-            } else {
-                0.0
-            }
-        }));
-        let apart_m = (map.ct_from_index(&index) - volume.ct_from_index(&index)).norm();
-        if apart_m > SAME_PLACE * spacing_m {
-            return Err(ImagingError::refused(format!(
-                "its corners are up to {:.2} mm from the volume's",
-                1e3 * apart_m
-            ))
-            .at("label map")
-            .hint(hint));
-        }
-    }
-    Ok(())
-}
-
-/// Structures of a label map instead of those that were found.
-fn take_over(found: &mut Segmentation, given: &[Given]) {
-    let body = found.body.bounds;
-    let of = |name: &str| given.iter().find(|each| each.structure.name == name);
-    let in_body = |each: &Given| {
-        let mut whole = Mask::empty(found.body.mask.size());
-        whole.unite_within(&each.bounds, &each.mask);
-        whole.cropped(&body)
-    };
-    for (side, name) in [(Side::Left, "lung_left"), (Side::Right, "lung_right")] {
-        if let Some(mask) = of(name).map(in_body) {
-            for lung in found
-                .lungs
-                .lungs
-                .iter_mut()
-                .filter(|lung| lung.side == side)
-            {
-                lung.mask = mask.clone();
-            }
-        }
-    }
-    let bones = given
-        .iter()
-        .filter(|each| each.structure.tissue == SurfaceTissue::Bone);
-    let mut bone: Option<Mask> = None;
-    for mask in bones.map(in_body) {
-        bone.get_or_insert_with(|| Mask::empty(body.size()))
-            .unite(&mask);
-    }
-    if let Some(bone) = bone {
-        found.bone.bone = bone;
-    }
-}
+/// Bone of the volume that a label map with bones lacks.
+const OTHER_BONE: &str = "other_bone";
 
 /// Where a surface runs.
 enum Runs {
@@ -356,6 +236,7 @@ struct Job<'a> {
 fn jobs<'a>(
     found: &'a Segmentation,
     given: &'a [Given],
+    other_bone: Option<&'a Mask>,
     lesions: &'a [Lesion],
     options: &ReconstructOptions,
 ) -> Vec<Job<'a>> {
@@ -398,10 +279,7 @@ fn jobs<'a>(
     );
     let lungs = &found.lungs;
     for lung in &lungs.lungs {
-        let name = match lung.side {
-            Side::Left => "lung_left",
-            Side::Right => "lung_right",
-        };
+        let name = lung.side.structure();
         let runs = Runs::At {
             level_hu: levels.lung_hu,
             typical: [LUNG, SOFT],
@@ -452,7 +330,29 @@ fn jobs<'a>(
         sizes.other,
         SMALL_CELL_M,
     );
+    if let Some(mask) = other_bone {
+        jobs.push(Job {
+            name: OTHER_BONE.to_owned(),
+            tissue: SurfaceTissue::Bone,
+            organ: None,
+            bounds: bone.bounds,
+            mask,
+            runs: Runs::BoneMiddle,
+            target: sizes.bone,
+            cell_m: BONE_CELL_M,
+            lesion: None,
+        });
+    }
     for each in given {
+        // A lung of the map with what else of it was found.
+        let found_lung = lungs
+            .lungs
+            .iter()
+            .find(|lung| each.structure.name == lung.side.structure());
+        let (bounds, mask) = match found_lung {
+            Some(lung) => (lungs.bounds, &lung.mask),
+            None => (each.bounds, &each.mask),
+        };
         let target = match each.structure.tissue {
             SurfaceTissue::Skin => sizes.skin,
             SurfaceTissue::Lung => sizes.lung,
@@ -463,8 +363,8 @@ fn jobs<'a>(
             name: each.structure.name.clone(),
             tissue: each.structure.tissue,
             organ: None,
-            bounds: each.bounds,
-            mask: &each.mask,
+            bounds,
+            mask,
             runs: Runs::Mask,
             target,
             cell_m: SMALL_CELL_M,
@@ -504,10 +404,7 @@ fn organ_of(found: &Segmentation, lesion: &Lesion) -> Option<String> {
         (part.count(), lung.side)
     });
     let (count, side) = shares.max_by_key(|(count, _)| *count)?;
-    (2 * count > lesion.mask.count()).then(|| match side {
-        Side::Left => "lung_left".to_owned(),
-        Side::Right => "lung_right".to_owned(),
-    })
+    (2 * count > lesion.mask.count()).then(|| side.structure().to_owned())
 }
 
 /// A surface and what was measured on the fine one.
@@ -760,44 +657,4 @@ fn size_of(mesh: &TriangleMesh, grid: &VoxelGrid) -> LesionSize {
         axial_width_m,
         centroid_m: needlebench_geometry::mesh::centroid_m(mesh),
     }
-}
-
-/// The label map of what was found; one that was given stands before it, and lesions before both.
-fn labels(
-    volume: &Volume,
-    found: &Segmentation,
-    lesions: &[Lesion],
-    options: &ReconstructOptions,
-) -> (LabelMap, Vec<LabelFacts>) {
-    let Some(given) = &options.labels else {
-        return label_map(volume, found, lesions);
-    };
-    let (own, _) = label_map(volume, found, &[]);
-    let mut is_used = vec![false; 1 << 16];
-    for &label in &given.labels {
-        is_used[usize::from(label)] = true;
-    }
-    for (label, _) in &given.names {
-        is_used[usize::from(*label)] = true;
-    }
-    let mut map = given.clone();
-    let mut numbers: Vec<u16> = vec![0; 1 << 16];
-    let unused = (FIRST_OWN..=u16::MAX).filter(|&label| !is_used[usize::from(label)]);
-    for (number, (label, name)) in unused.zip(&own.names) {
-        numbers[usize::from(*label)] = number;
-        map.names.push((number, name.clone()));
-    }
-    for (label, own) in map.labels.iter_mut().zip(&own.labels) {
-        if *label == 0 {
-            *label = numbers[usize::from(*own)];
-        }
-    }
-    let unused = (FIRST_LESION..FIRST_OWN).filter(|&label| !is_used[usize::from(label)]);
-    for (label, lesion) in unused.zip(lesions) {
-        paint(&mut map, &lesion.bounds, &lesion.mask, label);
-        map.names.push((label, lesion.name.clone()));
-    }
-    map.names.sort();
-    let facts = label_facts(&map);
-    (map, facts)
 }

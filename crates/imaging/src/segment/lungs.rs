@@ -45,6 +45,16 @@ pub enum Side {
     Right,
 }
 
+impl Side {
+    /// Name of the lung on this side.
+    pub fn structure(self) -> &'static str {
+        match self {
+            Self::Left => "lung_left",
+            Self::Right => "lung_right",
+        }
+    }
+}
+
 /// One lung, with its vessels and what else it encloses.
 #[derive(Debug, Clone)]
 pub struct Lung {

@@ -606,3 +606,115 @@ fn label_map_of_another_grid_is_refused() {
     assert_eq!(refusal(&error).0, Some("label map"));
     assert!(refusal(&error).1.contains("corners"));
 }
+
+/// What is found without a label map, and with one of these labels by voxel and density.
+fn with_map(names: &[(u16, &str)], label: impl Fn([usize; 3], i16) -> u16) -> [Reconstruction; 2] {
+    let volume = render(&chest(), grid());
+    let mut options = options();
+    let clear = run(&volume, &options).unwrap();
+    let labels = volume.hu.iter().enumerate().map(|(at, &hu)| {
+        let voxel = [
+            at % SIZE[0],
+            at / SIZE[0] % SIZE[1],
+            at / (SIZE[0] * SIZE[1]),
+        ];
+        label(voxel, hu)
+    });
+    options.labels = Some(LabelMap {
+        grid: volume.grid.clone(),
+        labels: labels.collect(),
+        names: names
+            .iter()
+            .map(|(label, name)| (*label, (*name).to_owned()))
+            .collect(),
+    });
+    let made = run(&volume, &options).unwrap();
+    [clear, made]
+}
+
+/// Voxels of what is called so in a label map.
+fn voxels_of(made: &Reconstruction, called: &[&str]) -> Vec<bool> {
+    let numbers: Vec<u16> = made
+        .labels
+        .names
+        .iter()
+        .filter(|(_, name)| called.contains(&name.as_str()))
+        .map(|(label, _)| *label)
+        .collect();
+    let labels = made.labels.labels.iter();
+    labels.map(|label| numbers.contains(label)).collect()
+}
+
+fn lacks(whole: &[bool], part: &[bool]) -> usize {
+    let pairs = whole.iter().zip(part);
+    pairs.filter(|(whole, part)| **part && !**whole).count()
+}
+
+#[test]
+fn a_map_of_one_vertebra_leaves_the_other_bones() {
+    let half = SIZE[2] / 2;
+    let [clear, made] = with_map(&[(3, "vertebrae_T8")], |[_, _, k], hu| {
+        3 * u16::from(hu >= 100 && k < half)
+    });
+    let bone = voxels_of(&made, &["bone", "vertebrae_T8"]);
+    assert_eq!(lacks(&bone, &voxels_of(&clear, &["bone"])), 0);
+    let surface = |name: &str| made.surfaces.iter().find(|each| each.name == name);
+    let (mapped, other) = (
+        surface("vertebrae").unwrap(),
+        surface("other_bone").expect("half of the bone is not in the map"),
+    );
+    assert_eq!(other.tissue, SurfaceTissue::Bone);
+    let all = clear.surfaces.iter().find(|each| each.name == "bone");
+    let share = (mapped.volume_m3 + other.volume_m3) / all.unwrap().volume_m3;
+    assert!((0.9..1.2).contains(&share), "{share}");
+    assert!(remarks(&made).contains("of the bone found in the volume, which stay bone"));
+}
+
+#[test]
+fn labels_without_a_meaning_change_nothing() {
+    for name in ["left_out", "lung"] {
+        let [clear, made] = with_map(&[(1, name), (2, "liver")], |_, _| 1);
+        for found in ["bone", "lung_left", "lung_right"] {
+            let (here, there) = (voxels_of(&made, &[found]), voxels_of(&clear, &[found]));
+            assert_eq!(here, there, "{name} {found}");
+        }
+        let areas = |made: &Reconstruction| -> Vec<(String, f64)> {
+            let each = made.surfaces.iter();
+            each.map(|each| (each.name.clone(), each.volume_m3))
+                .collect()
+        };
+        assert_eq!(areas(&made), areas(&clear), "{name}");
+    }
+}
+
+#[test]
+fn an_outside_holds_what_is_in_it_and_a_hull_is_no_body() {
+    let [clear, made] = with_map(&[(1, "body")], |_, hu| u16::from(hu > -2000));
+    for found in ["bone", "lung_left", "lung_right"] {
+        let (here, there) = (voxels_of(&made, &[found]), voxels_of(&clear, &[found]));
+        assert_eq!(here, there, "{found}");
+    }
+    let [_, hull] = with_map(&[(1, "skin")], |[i, _, _], _| u16::from(i < SIZE[0] / 8));
+    assert!(remarks(&hull).contains("the skin is taken from the volume"));
+    let skin = hull.surfaces.iter().find(|each| each.name == "skin");
+    assert!(skin.unwrap().level_hu.is_some());
+}
+
+#[test]
+fn one_lobe_is_not_the_lung() {
+    let half = SIZE[2] / 2;
+    let [clear, made] = with_map(&[(10, "lung_upper_lobe_left")], |[i, _, k], hu| {
+        10 * u16::from((-900..-600).contains(&hu) && i >= SIZE[0] / 2 && k >= half)
+    });
+    let lung = voxels_of(
+        &made,
+        &["lung_left", "lung_upper_lobe_left", "lung_vessels"],
+    );
+    assert_eq!(lacks(&lung, &voxels_of(&clear, &["lung_left"])), 0);
+    let volume = |made: &Reconstruction| {
+        let lung = made.surfaces.iter().find(|each| each.name == "lung_left");
+        lung.unwrap().volume_m3
+    };
+    let share = volume(&made) / volume(&clear);
+    assert!((0.95..1.1).contains(&share), "{share}");
+}
