@@ -6,11 +6,12 @@ use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use nalgebra::Point3;
 use needlebench_cell::ClearanceClass;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
 use needlebench_evaluation::report::{
-    EngineFailure, GoalReport, NotJudged, Report, Status, Verdict,
+    ClassClearance, EngineFailure, GoalReport, NotJudged, Report, Status, Verdict,
 };
 use needlebench_evaluation::trace::trace;
 use needlebench_evaluation::{
@@ -64,6 +65,7 @@ pub fn run(
     };
     judge_alone(&mut finished.report, runnable.scenario(), options, &engines);
     judge_unseen(&mut finished.report, runnable.scenario());
+    judge_cuts(&mut finished.report, runnable.scenario());
     judge_absent(&mut finished.report, runnable.scenario(), &engines);
     let requirements = &runnable.scenario().scenario.requirements;
     trace(&mut finished.report, requirements);
@@ -115,6 +117,76 @@ fn judge_unseen(report: &mut Report, resolved: &ResolvedScenario) {
         leave_open(report, &[&key], &reason);
     }
 }
+
+/// A clearance from the patient is not evaluated where the body may go on nearer, behind a cut of the scan. The
+/// planning's own limits are on it even where no criterion is. It is a failure all the same where it is too small.
+fn judge_cuts(report: &mut Report, resolved: &ResolvedScenario) {
+    let Some(placed) = &resolved.phantom else {
+        return;
+    };
+    let phantom_from_world = placed.world_from_phantom.inverse();
+    let is_at_cut = |found: &ClassClearance| {
+        let from_unseen_m = found.witness_points_m.iter().map(|point| {
+            let point = phantom_from_world * Point3::from(*point);
+            placed.phantom.distance_from_unseen_m(&point)
+        });
+        from_unseen_m.fold(f64::INFINITY, f64::min) <= found.minimum_m.max(0.0) + AT_CUT_M
+    };
+    let mut left_open = Vec::new();
+    for goal in &mut report.goals {
+        for configuration in &mut goal.configurations {
+            if configuration.status == Status::Rejected {
+                continue;
+            }
+            for class in FROM_PATIENT.map(ClearanceClass::name) {
+                let found = configuration.clearance.classes.get(class);
+                if !found.is_some_and(is_at_cut) {
+                    continue;
+                }
+                let key = format!("min_clearance_mm.{class}");
+                let known = report.criteria.iter().position(|each| {
+                    each.criterion == key
+                        && each.goal == goal.name
+                        && each.label.as_deref() == Some(configuration.label)
+                });
+                match known {
+                    Some(at) if !report.criteria[at].pass => continue,
+                    Some(at) => {
+                        report.criteria.remove(at);
+                    }
+                    None => {}
+                }
+                configuration.not_judged += 1;
+                left_open.push(NotJudged {
+                    goal: goal.name.clone(),
+                    label: Some(configuration.label.to_owned()),
+                    engine: None,
+                    criterion: key,
+                    reason: AT_CUT.to_owned(),
+                    requirement: None,
+                });
+            }
+        }
+    }
+    report.not_judged.extend(left_open);
+    report.verdict = Verdict::of(
+        report.verdict == Verdict::Fail,
+        !report.not_judged.is_empty(),
+    );
+}
+
+/// What may be nearer to the patient than a scan shows.
+const FROM_PATIENT: [ClearanceClass; 3] = [
+    ClearanceClass::RobotPhantom,
+    ClearanceClass::ToolPhantom,
+    ClearanceClass::GuideStandoff,
+];
+
+/// The nearest point is taken for one of the cut so near to it, m: what breath and registration move a patient.
+const AT_CUT_M: f64 = 5e-3;
+
+/// Why a clearance from the patient is not evaluated.
+const AT_CUT: &str = "nearest where the scan ends, and the skin beyond was not seen";
 
 /// A required criterion for which the scenario has no value, such as the clearance of a gantry that is not in the
 /// room, is not evaluated.

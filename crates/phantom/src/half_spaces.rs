@@ -15,6 +15,16 @@ struct HalfSpace {
 pub struct HalfSpaces(Vec<HalfSpace>);
 
 impl HalfSpaces {
+    /// Points `p` with `normal . p <= offset_m` for all of these normals and offsets.
+    pub fn new(planes: impl IntoIterator<Item = (UnitVector3<f64>, f64)>) -> Self {
+        let planes = planes.into_iter();
+        Self(
+            planes
+                .map(|(normal, offset_m)| HalfSpace { normal, offset_m })
+                .collect(),
+        )
+    }
+
     /// Face planes of a convex solid; `None` if the solid is not a convex mesh.
     pub fn of(solid: &Solid) -> Option<Self> {
         let Shape::Convex(mesh) = &solid.shape else {

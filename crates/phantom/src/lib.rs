@@ -17,6 +17,7 @@ mod organs;
 mod parameters;
 mod ribs;
 mod route_obstacles;
+mod scan_ends;
 mod scapula;
 mod skeleton;
 mod skin;
@@ -42,6 +43,8 @@ pub use route_obstacles::{RouteObstacle, RouteObstacles};
 use envelope::Envelope;
 pub use half_spaces::HalfSpaces;
 pub use limbs::{Support, limbs};
+pub use scan_ends::ScanEnd;
+use scan_ends::ScanEnds;
 pub use skin::SkinSurface;
 
 /// Colour of the skin.
@@ -157,6 +160,8 @@ pub struct Phantom {
     /// Skin markers, in the order of the parameters.
     pub markers: Vec<Marker>,
     skin_surface: SkinSurface,
+    /// Where a scan ends that the parts are from; none if it ends nowhere.
+    scan_ends: Option<ScanEnds>,
     route_obstacles: route_obstacles::OnDemand,
 }
 
@@ -218,6 +223,7 @@ impl Phantom {
             lesions,
             markers,
             skin_surface: SkinSurface::Convex(skin_faces),
+            scan_ends: None,
             route_obstacles: route_obstacles::OnDemand::default(),
         })
     }
@@ -236,8 +242,31 @@ impl Phantom {
             lesions,
             markers,
             skin_surface,
+            scan_ends: None,
             route_obstacles: route_obstacles::OnDemand::default(),
         }
+    }
+
+    /// The same, of a scan with these ends.
+    #[must_use]
+    pub fn with_scan_ends(self, ends: Vec<ScanEnd>) -> Self {
+        Self {
+            scan_ends: Some(ScanEnds::new(ends)),
+            ..self
+        }
+    }
+
+    /// Whether a point of the skin (phantom frame) is skin, and not where a scan cuts the body.
+    pub fn is_skin_seen(&self, point: &Point3<f64>) -> bool {
+        let ends = self.scan_ends.as_ref();
+        ends.is_none_or(|ends| ends.is_seen(point))
+    }
+
+    /// How far a point (phantom frame) is from where the body may go on behind the cuts of a scan, m: from the faces of
+    /// the cuts, and from what lies straight behind them. Infinite where nothing is cut.
+    pub fn distance_from_unseen_m(&self, point: &Point3<f64>) -> f64 {
+        let ends = self.scan_ends.as_ref();
+        ends.map_or(f64::INFINITY, |ends| ends.beyond_m(self.skin(), point))
     }
 
     /// Bones, vessels, organs and fissures, ready for distances; prepared once.

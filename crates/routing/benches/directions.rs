@@ -92,6 +92,7 @@ fn directions(criterion: &mut Criterion) {
     let rules = rules();
     let make = || {
         let options = VoxelOptions {
+            patient: None,
             lesions: &[],
             off: &[],
             needle_m: rules.longest_m,

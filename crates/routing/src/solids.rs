@@ -186,7 +186,9 @@ impl Anatomy for SolidAnatomy<'_> {
         };
         let entry = ray.at(depth_m);
         let normal = self.phantom.skin_normal(&entry);
-        let is_end = normal.z.abs() > END_Z || entry.z > self.highest_m;
+        let is_end = normal.z.abs() > END_Z
+            || entry.z > self.highest_m
+            || !self.phantom.is_skin_seen(&entry);
         if is_end {
             Exit::End(depth_m)
         } else {

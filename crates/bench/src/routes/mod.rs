@@ -141,7 +141,9 @@ impl RouteTask<'_> {
     ) -> Result<VoxelAnatomy, VoxelsError> {
         let target = GoalPlacer::new(self.resolved).target(self.section)?;
         let rules = self.route_rules();
+        let placed = self.resolved.phantom.as_ref();
         let options = VoxelOptions {
+            patient: placed.map(|placed| &placed.phantom),
             lesions: &built.lesions(),
             off: &self.resolved.scenario.planning.needle_route.off,
             needle_m: rules.longest_m,

@@ -301,6 +301,10 @@ impl Judge<'_> {
         let outwards = direction(azimuth, elevation);
         let skin = placed.phantom.skin_intersection(&self.target, &outwards);
         let (_, depth_m) = skin.ok_or(EntryRule::Blocked)?;
+        let skin = self.target + depth_m * outwards.into_inner();
+        if !placed.phantom.is_skin_seen(&skin) {
+            return Err(EntryRule::End);
+        }
         let needed_m = tool.guide_length_m() + self.section.standoff_mm * 1e-3 + depth_m;
         if tool.needle.length_m < needed_m {
             return Err(EntryRule::NeedleTooShort);

@@ -262,3 +262,44 @@ fn a_study_whose_engine_carries_out_no_motion_has_no_answer() {
     );
     assert!(!answer.stdout.contains("feasible in"), "{}", answer.stdout);
 }
+
+/// SMALL with a scan that ends at a plane of the patient.
+fn cut_at(bench: &Bench, normal: &str, offset_mm: u32) {
+    let cut = format!("\n[[phantom.cuts]]\nnormal = {normal}\noffset_mm = {offset_mm}\n");
+    bench.write("s.toml", format!("{SMALL}{cut}"));
+}
+
+#[test]
+fn clearances_near_a_cut_of_the_scan_are_left_open() {
+    let bench = Bench::with_scenario(SMALL);
+    // What is highest of the chest, under the tool, was not seen.
+    cut_at(&bench, "[0.0, -1.0, 0.0]", 100);
+    let report = bench
+        .run("run s.toml --engine rapier --json")
+        .exits_with(1)
+        .json();
+    assert_eq!(report["verdict"], "incomplete");
+    let open = report["not_judged"].list();
+    assert!(!open.is_empty());
+    for each in open {
+        holds(each["criterion"].word(), ["min_clearance_mm.", "_phantom"]);
+        holds(each["reason"].word(), ["scan ends"]);
+    }
+    // The patient's left side is far from all that moves.
+    cut_at(&bench, "[1.0, 0.0, 0.0]", 100);
+    bench.run("run s.toml --engine rapier").exits_with(0);
+}
+
+#[test]
+fn nothing_enters_through_a_cut_of_the_scan() {
+    let bench = Bench::with_scenario(SMALL);
+    cut_at(&bench, "[-1.0, 0.0, 0.0]", 100);
+    let answer = bench.run("check s.toml").exits_with(2);
+    holds(
+        &answer.stderr,
+        ["goals[0].flange_pose", "the entry is where the scan ends"],
+    );
+    cut_at(&bench, "[0.0, 0.0, 0.0]", 100);
+    let answer = bench.run("check s.toml").exits_with(2);
+    holds(&answer.stderr, ["phantom.cuts[0].normal", "no length"]);
+}

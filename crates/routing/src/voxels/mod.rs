@@ -6,6 +6,7 @@ mod mediastinum;
 mod normal;
 mod rays;
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, Vector3};
@@ -13,6 +14,7 @@ use needlebench_imaging::{
     Components, Connectivity, DistanceField, DistanceOptions, ImagingError, IndexBox, LabelMap,
     Mask, Remark, VoxelGrid, opened, structure_of,
 };
+use needlebench_phantom::Phantom;
 use needlebench_scenario::scenario::NeedleRouteSection;
 
 use crate::anatomy::Obstacle;
@@ -56,6 +58,8 @@ fn is_soft(name: &str) -> bool {
 /// What is asked of the voxels.
 #[derive(Debug, Clone, Copy)]
 pub struct VoxelOptions<'a> {
+    /// The patient that was built from the scan: where that ends. Without, at its first and last slice alone.
+    pub patient: Option<&'a Arc<Phantom>>,
     /// Labels that are lesions, by name.
     pub lesions: &'a [String],
     /// What the needle may pass through, by name: `bone`, `vessel` or `organ`, or a structure.
@@ -82,6 +86,7 @@ pub struct VoxelOptions<'a> {
 /// wrong: lower bounds, by exact fields at the voxels' centres and what these allow in between.
 #[derive(Debug)]
 pub struct VoxelAnatomy {
+    patient: Option<Arc<Phantom>>,
     grid: VoxelGrid,
     spacing_m: [f64; 3],
     /// From frame `phantom` to `ct`.
@@ -144,6 +149,7 @@ impl VoxelAnatomy {
             options.threads,
         );
         let mut anatomy = Self {
+            patient: options.patient.cloned(),
             grid: grid.clone(),
             spacing_m,
             origin_in_ct_m,

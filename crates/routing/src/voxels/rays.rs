@@ -1,7 +1,10 @@
 //! Rays through the voxels: what they pass, and what they come near to.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_imaging::DistanceField;
+use needlebench_phantom::Phantom;
 
 use super::blocks::{BLOCK, BodySide};
 use super::classes::{Kind, Mark};
@@ -316,7 +319,8 @@ impl Anatomy for VoxelAnatomy {
         };
         let last = self.grid.size()[2] - 1;
         let from_end = voxel[2].min(last - voxel[2]) as f64 * self.spacing_m[2];
-        if from_end < END_M {
+        let is_seen = |patient: &Arc<Phantom>| patient.is_skin_seen(&ray.at(skin_m));
+        if from_end < END_M || !self.patient.as_ref().is_none_or(is_seen) {
             Exit::End(skin_m)
         } else {
             Exit::Skin(skin_m)

@@ -119,6 +119,7 @@ fn anatomy(labels: &LabelMap, threads: usize) -> VoxelAnatomy {
         Vector3::zeros(),
         Point3::from(TARGET),
         &VoxelOptions {
+            patient: None,
             lesions: &["nodule".to_owned()],
             off: &[],
             needle_m: rules().longest_m,
@@ -288,6 +289,7 @@ fn nothing_goes_through_a_marker_on_the_skin() {
     let middle = Point3::from(TARGET) + direction.into_inner() * (skin_m + 3e-3);
     let with = |markers: &[(Point3<f64>, f64)]| {
         let options = VoxelOptions {
+            patient: None,
             lesions: &["nodule".to_owned()],
             off: &[],
             needle_m: rules().longest_m,
@@ -361,6 +363,7 @@ fn what_lies_between_the_lungs_is_an_organ_but_not_the_muscles_of_the_back() {
     ];
     let at = |labels: &LabelMap, target: [f64; 3], off: &[String]| {
         let options = VoxelOptions {
+            patient: None,
             lesions: &[],
             off,
             needle_m: 0.15,
@@ -435,6 +438,7 @@ fn what_lies_between_the_lungs_is_no_way_out_of_the_body() {
         ],
     );
     let options = VoxelOptions {
+        patient: None,
         lesions: &[],
         off: &[],
         needle_m: 0.15,
@@ -528,6 +532,7 @@ fn refinement_never_makes_a_route_worse() {
 fn targets_outside_are_refused() {
     let labels = chest(false);
     let options = VoxelOptions {
+        patient: None,
         lesions: &[],
         off: &[],
         needle_m: 0.1,

@@ -72,7 +72,7 @@ pub use people::{
     ElbowPreference, Handedness, PeopleSection, PersonSection, Role, Side, StaturePercentile,
 };
 pub(crate) use phantom::NO_MODEL;
-pub use phantom::{LengthUnit, PartSection, PartTissue, PhantomSection, Posture};
+pub use phantom::{CutSection, LengthUnit, PartSection, PartTissue, PhantomSection, Posture};
 pub use planning::{NeedleRouteSection, PlanningSection, RollAim};
 pub use ranking::RankingSection;
 pub use recording::RecordingSection;

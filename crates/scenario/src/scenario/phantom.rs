@@ -68,6 +68,8 @@ pub struct PhantomSection {
     pub head: bool,
     /// Parts from mesh files, in addition to the model's or replacing them.
     pub parts: Vec<PartSection>,
+    /// Planes at which the scan ends that the parts are from.
+    pub cuts: Vec<CutSection>,
 }
 
 impl Default for PhantomSection {
@@ -87,8 +89,22 @@ impl Default for PhantomSection {
             arms: Arms::None,
             head: false,
             parts: Vec::new(),
+            cuts: Vec::new(),
         }
     }
+}
+
+/// A plane at which a scan ends. The surface beyond it is the cut through the body and no skin: nothing enters there, and
+/// a clearance that the unseen body behind it may undercut is not evaluated.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CutSection {
+    /// Direction away from what was scanned, phantom frame (left, posterior, superior); of any length but 0.
+    #[schemars(inner(range(min = -1.0, max = 1.0)))]
+    pub normal: [f64; 3],
+    /// Distance of the plane from the phantom's origin along the normal, mm.
+    #[schemars(range(min = -10_000.0, max = 10_000.0))]
+    pub offset_mm: f64,
 }
 
 fn models(_: &mut SchemaGenerator) -> Schema {

@@ -6,7 +6,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_input::{Finding, TomlText};
 use needlebench_kinematics::pose_from_rotation_vector;
 
-use super::checks::true_target;
+use super::checks::{true_target, unseen_entry};
 use super::{Goal, Roll, Surroundings};
 use crate::scenario::GoalSection;
 
@@ -78,6 +78,10 @@ pub(super) fn from_flange_pose(
                 .hint(
                     "the skin must be ahead of the guide's exit, and the needle must end inside",
                 ));
+        }
+        let entry = exit + axis.into_inner() * enters_m;
+        if !placed.phantom.is_skin_seen(&(to_phantom * entry)) {
+            return Err(unseen_entry(text, &key("flange_pose")));
         }
         standoff_m = Some(enters_m);
         target_organ = placed.phantom.organ_at(&(to_phantom * target_m));

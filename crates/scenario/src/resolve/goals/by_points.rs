@@ -7,7 +7,7 @@ use needlebench_input::{Finding, TomlText, nearest_name};
 use needlebench_kinematics::Pose;
 use needlebench_phantom::Phantom;
 
-use super::checks::true_target;
+use super::checks::{true_target, unseen_entry};
 use super::{Goal, Roll, Surroundings};
 use crate::scenario::GoalSection;
 
@@ -118,6 +118,9 @@ pub(super) fn from_entry_and_target(
         ));
     }
     let on_skin = entry + axis.into_inner() * enters_m;
+    if !phantom.is_skin_seen(&on_skin) {
+        return Err(unseen_entry(text, &key(entry_key)));
+    }
     let standoff_m = section.standoff_mm * 1e-3;
     let exit = on_skin - axis.into_inner() * standoff_m;
     let to_target_m = (target - exit).norm();

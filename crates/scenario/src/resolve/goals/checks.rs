@@ -132,3 +132,12 @@ pub(super) fn check_target(
         )
         .hint("move the target, or define a lesion there if the bone is to be pierced"))
 }
+
+/// An entry where the scan cuts the body.
+pub(super) fn unseen_entry(text: &TomlText<'_>, key: &str) -> Finding {
+    let message = "the entry is where the scan ends: no skin was seen there";
+    text.finding(key, message).hint(
+        "choose an entry that the scan shows (`needlebench ct routes`), or scan with a larger field of view; the \
+         scan's ends are [[phantom.cuts]]",
+    )
+}

@@ -6,11 +6,11 @@ mod place;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_geometry::{Placement, PreparedShape};
 use needlebench_input::{Finding, Location, ModelSource, TomlText, nearest_name, source_of};
 use needlebench_kinematics::Pose;
-use needlebench_phantom::{PARAMETERS, Phantom, PhantomError, PhantomParameters};
+use needlebench_phantom::{PARAMETERS, Phantom, PhantomError, PhantomParameters, ScanEnd};
 
 use super::cache::Cache;
 use crate::scenario::{NO_MODEL, PhantomSection};
@@ -116,6 +116,7 @@ pub(super) fn scenario_phantom(
         Some(phantom) if section.parts.is_empty() => (phantom, Vec::new()),
         shipped => with_mesh_parts(toml, &section.parts, shipped, base, &mut notes).map_err(one)?,
     };
+    let phantom = cut_phantom(toml, section, phantom).map_err(one)?;
     let skin = phantom.skin();
     // A polyhedron is its own surface, whatever the fineness.
     let surface = skin.shape.surface(0.0);
@@ -132,6 +133,28 @@ pub(super) fn scenario_phantom(
         lowest_m: Cache::default(),
         ball: OnceLock::new(),
     })
+}
+
+/// The phantom with the ends of its scan.
+fn cut_phantom(
+    toml: &TomlText<'_>,
+    section: &PhantomSection,
+    phantom: Phantom,
+) -> Result<Phantom, Finding> {
+    if section.cuts.is_empty() {
+        return Ok(phantom);
+    }
+    let cuts = section.cuts.iter().enumerate().map(|(index, cut)| {
+        let normal = UnitVector3::try_new(Vector3::from(cut.normal), 0.0).ok_or_else(|| {
+            let key = format!("phantom.cuts[{index}].normal");
+            toml.finding(&key, "the normal of a cut has no length")
+                .hint("a direction away from what was scanned, e.g. [0, 0, 1] for the upper end")
+        })?;
+        let offset_m = 1e-3 * cut.offset_mm;
+        Ok(ScanEnd { normal, offset_m })
+    });
+    let ends = cuts.collect::<Result<_, Finding>>()?;
+    Ok(phantom.with_scan_ends(ends))
 }
 
 /// A phantom without a model is what its parts are.
