@@ -10,6 +10,7 @@
 mod components;
 mod distance;
 mod error;
+mod field_of_view;
 mod grid;
 mod histogram;
 mod image_circle;
@@ -34,6 +35,7 @@ pub mod write;
 pub use components::{Component, Components, Connectivity};
 pub use distance::{DistanceField, DistanceOptions};
 pub use error::{ImagingError, Remark};
+pub use field_of_view::{Cut, FieldOfView};
 pub use grid::{NotAGrid, VoxelGrid};
 pub use histogram::HuHistogram;
 pub use image_circle::ImageCircle;

@@ -10,11 +10,13 @@ use needlebench_parallel::in_parallel;
 use serde::Serialize;
 
 use crate::error::{ImagingError, Remark};
+use crate::field_of_view::FieldOfView;
 use crate::grid::VoxelGrid;
 use crate::label_map::{Given, complete, completed_labels, given_structures, is_solid};
 use crate::mask::{IndexBox, Mask};
 use crate::segment::{
-    LabelFacts, Lesion, LesionSeed, Levels, Segmentation, grow_lesion, label_map, segment,
+    LabelFacts, Lesion, LesionSeed, Levels, Segmentation, check_complete, grow_lesion, label_map,
+    segment,
 };
 use crate::spacing::{orthogonal, whole};
 use crate::structures::SurfaceTissue;
@@ -35,6 +37,8 @@ pub struct ReconstructOptions {
     pub sizes: SurfaceSizes,
     /// Where surfaces run.
     pub levels: Levels,
+    /// What the scan has seen; what the volume shows of it if left out.
+    pub field_of_view: Option<FieldOfView>,
 }
 
 /// Triangles that surfaces are reduced to, as long as they stay near the voxels.
@@ -168,8 +172,11 @@ pub fn reconstruct(
     progress: Progress<'_>,
 ) -> Result<Reconstruction, ImagingError> {
     orthogonal(&volume.grid)?;
+    check_complete(volume)?;
     progress("tissues", 0.0);
-    let mut found = segment(volume, &options.levels, cancel)?;
+    let seen = options.field_of_view.clone();
+    let seen = seen.unwrap_or_else(|| FieldOfView::of(volume));
+    let mut found = segment(volume, &seen, &options.levels, cancel)?;
     let mut remarks = std::mem::take(&mut found.remarks);
     let mut given = match &options.labels {
         Some(map) => given_structures(map, &volume.grid, &mut remarks)?,

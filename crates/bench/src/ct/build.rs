@@ -12,8 +12,8 @@ use needlebench_imaging::registration::{
     match_markers, register_weighted,
 };
 use needlebench_imaging::{
-    ImagingError, LabelMap, LesionSeed, ReconstructOptions, Reconstruction, Remark, Surface,
-    SurfaceSizes, SurfaceTissue, Volume, reconstruct, resample, structure_of,
+    FieldOfView, ImagingError, LabelMap, LesionSeed, ReconstructOptions, Reconstruction, Remark,
+    Surface, SurfaceSizes, SurfaceTissue, Volume, reconstruct, resample, structure_of,
 };
 use needlebench_scenario::scenario::PartTissue;
 use serde::Serialize;
@@ -96,6 +96,8 @@ pub struct SeenScan {
     pub source: Description,
     /// Surfaces, labels and lesions.
     pub made: Reconstruction,
+    /// Where it ends.
+    pub field_of_view: FieldOfView,
     /// Markers; none if none were looked for.
     pub markers: Option<Found>,
     /// What is worth knowing: of reading, of markers, of tissues.
@@ -159,6 +161,7 @@ pub(super) fn see(
     } = *control;
     let _stage = tracing::info_span!("see").entered();
     let mut remarks = read.remarks;
+    let field_of_view = FieldOfView::of(&read.volume);
     let resampled = resample(read.volume, options.max_bytes, threads, cancel)?;
     let is_interpolated = resampled.remark.is_some();
     tracing::info!(is_interpolated, "volume on a straight grid");
@@ -185,6 +188,7 @@ pub(super) fn see(
         lesions: options.lesions.clone(),
         labels,
         sizes: options.sizes,
+        field_of_view: Some(field_of_view.clone()),
         ..ReconstructOptions::default()
     };
     let step = |what: &str, share: f64| {
@@ -205,6 +209,7 @@ pub(super) fn see(
         volume,
         source: read.description,
         made,
+        field_of_view,
         markers,
         remarks,
         voxels_sha256: OnceLock::new(),

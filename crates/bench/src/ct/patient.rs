@@ -9,8 +9,8 @@ use needlebench_kinematics::Pose;
 use needlebench_phantom::Tissue;
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::scenario::{
-    CovarianceMm2, GoalSection, ImagingBlock, PartSection, PhantomSection, RegistrationBlock,
-    Scenario,
+    CovarianceMm2, CutSection, GoalSection, ImagingBlock, PartSection, PhantomSection,
+    RegistrationBlock, Scenario,
 };
 
 use super::ScanBuild;
@@ -192,10 +192,12 @@ fn phantom(
         },
     });
     let parts = parts.collect();
+    let cuts = cuts(build, frame);
     match model {
         Some(_) => PhantomSection {
             markers: None,
             parts,
+            cuts,
             ..own
         },
         None => PhantomSection {
@@ -207,9 +209,27 @@ fn phantom(
             arms: needlebench_scenario::scenario::Arms::None,
             head: false,
             parts,
+            cuts,
             ..own
         },
     }
+}
+
+/// Where the scan ends, as the patient has it.
+fn cuts(build: &ScanBuild, frame: &PatientFrame) -> Vec<CutSection> {
+    let surfaces = &build.seen.made.surfaces;
+    let skin = surfaces
+        .iter()
+        .find(|each| each.tissue == SurfaceTissue::Skin);
+    let cuts = skin.map_or_else(Vec::new, |skin| build.seen.field_of_view.cuts(&skin.mesh));
+    let cuts = cuts.iter().map(|cut| {
+        let offset_m = cut.offset_m - cut.normal.dot(&frame.origin_in_ct_m);
+        CutSection {
+            normal: cut.normal.map(|value| rounded(value, PLACE_STEP)).into(),
+            offset_mm: rounded(offset_m * 1e3, PLACE_STEP),
+        }
+    });
+    cuts.collect()
 }
 
 fn in_mm2(covariance_m2: &Matrix3<f64>) -> CovarianceMm2 {

@@ -1,10 +1,12 @@
 //! The patient without the couch.
 
+use nalgebra::Point3;
+
 use crate::components::{Components, Connectivity};
 use crate::error::{ImagingError, Remark};
+use crate::field_of_view::FieldOfView;
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::{dilated, opened};
-use crate::volume::{AIR_HU, Volume};
 
 use super::{Scan, below, side_in_words};
 
@@ -26,6 +28,9 @@ const OUTSIDE_HU: f64 = -940.0;
 /// Air at the border of the volume that may be a lung which the field of view cuts.
 const CUT_LUNG_L: f64 = 0.05;
 
+/// Voxels so near to a side of the field of view end there, pixels.
+const RIM_PIXELS: f64 = 0.75;
+
 /// Area of contact, or of a cut, that is worth a remark.
 const WORTH_MENTIONING_M2: f64 = 1e-4;
 
@@ -45,7 +50,11 @@ pub struct Body {
     pub contact_m2: f64,
 }
 
-pub(super) fn find(scan: &Scan<'_>, remarks: &mut Vec<Remark>) -> Result<Body, ImagingError> {
+pub(super) fn find(
+    scan: &Scan<'_>,
+    seen: &FieldOfView,
+    remarks: &mut Vec<Remark>,
+) -> Result<Body, ImagingError> {
     let level = below(scan.levels.skin_hu);
     let tissue = Mask::of(scan.size(), &scan.volume.hu, |hu| hu > level);
     scan.check()?;
@@ -65,7 +74,7 @@ pub(super) fn find(scan: &Scan<'_>, remarks: &mut Vec<Remark>) -> Result<Body, I
             1e4 * contact_m2
         )));
     }
-    let cut_sides = cut_sides(scan, &solid, remarks);
+    let cut_sides = cut_sides(scan, seen, &solid, remarks);
     Ok(Body {
         centroid: centroid(&mask),
         mask,
@@ -147,11 +156,7 @@ fn note_others(scan: &Scan<'_>, parts: &Components, body: usize, remarks: &mut V
             continue;
         }
         let [i, j, k] = other.centroid();
-        let at = 1e3
-            * scan
-                .volume
-                .grid
-                .ct_from_index(&nalgebra::Point3::new(i, j, k));
+        let at = 1e3 * scan.volume.grid.ct_from_index(&Point3::new(i, j, k));
         remarks.push(Remark::new(format!(
             "a region of {litres:.1} l at [{:.0}, {:.0}, {:.0}] mm is not connected to the body \
              and is ignored (an arm, the couch?)",
@@ -233,75 +238,60 @@ fn contact_m2(scan: &Scan<'_>, one: &Mask, other: &Mask) -> f64 {
     f64::from(along_i) * y * z + f64::from(along_j) * x * z
 }
 
-/// Where the body is cut by the volume's sides, or by the circle that a scanner fills.
-fn cut_sides(scan: &Scan<'_>, solid: &Mask, remarks: &mut Vec<Remark>) -> Vec<&'static str> {
-    let [nx, ny, nz] = scan.size();
+/// Where the sides of the field of view cut the body.
+fn cut_sides(
+    scan: &Scan<'_>,
+    seen: &FieldOfView,
+    solid: &Mask,
+    remarks: &mut Vec<Remark>,
+) -> Vec<&'static str> {
+    let grid = &scan.volume.grid;
+    let [_, ny, nz] = scan.size();
     let [x, y, z] = scan.spacing_m;
-    // Faces at i = 0, i = nx - 1, j = 0, j = ny - 1.
-    let mut counts = [0_usize; 4];
-    let circle = padding_circle(scan.volume);
-    for k in 0..nz {
-        for j in 0..ny {
-            counts[0] += usize::from(solid.get([0, j, k]));
-            counts[1] += usize::from(solid.get([nx - 1, j, k]));
-        }
-        counts[2] += solid.runs(0, k).map(|[from, to]| to - from).sum::<usize>();
-        counts[3] += solid
-            .runs(ny - 1, k)
-            .map(|[from, to]| to - from)
-            .sum::<usize>();
-        let Some(radius) = circle else {
-            continue;
+    let near_m = RIM_PIXELS * x.max(y);
+    // Towards -i, +i, -j, +j.
+    let mut areas_m2 = [0.0; 4];
+    let mut add = |voxel: [usize; 3], face: usize, area_m2: f64| {
+        let place = grid.ct_from_index(&Point3::from(voxel.map(|index| index as f64)));
+        let Some((depth_m, normal)) = seen.nearest_side(&place) else {
+            return;
         };
-        let middle = [0.5 * (nx - 1) as f64, 0.5 * (ny - 1) as f64];
-        for j in 0..ny {
-            for i in solid.runs(j, k).flat_map(|[from, to]| [from, to - 1]) {
-                let away = [i as f64 - middle[0], j as f64 - middle[1]];
-                if libm::hypot(away[0], away[1]) > radius - 1.5 {
-                    let side = match (away[0].abs() > away[1].abs(), away[0] > 0.0, away[1] > 0.0) {
-                        (true, right, _) => usize::from(right),
-                        (false, _, back) => 2 + usize::from(back),
-                    };
-                    counts[side] += 1;
+        let along = grid.steps_m().column(face / 2).normalize();
+        let outwards = if face % 2 == 1 { along } else { -along };
+        // What a stair of voxels has of the side's area.
+        let share = outwards.dot(&normal);
+        if depth_m < near_m && share > 0.0 {
+            areas_m2[face] += share * area_m2;
+        }
+    };
+    for (j, k) in (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k))) {
+        for [from, to] in solid.runs(j, k) {
+            add([from, j, k], 0, y * z);
+            add([to - 1, j, k], 1, y * z);
+        }
+        for (face, near) in [(2, j.checked_sub(1)), (3, Some(j + 1).filter(|&j| j < ny))] {
+            for (at, &word) in solid.row(j, k).iter().enumerate() {
+                let beside = near.map_or(0, |near| solid.row(near, k)[at]);
+                let mut open = word & !beside;
+                while open != 0 {
+                    let bit = open.trailing_zeros() as usize;
+                    add([64 * at + bit, j, k], face, x * z);
+                    open &= open - 1;
                 }
             }
         }
     }
     let mut sides = Vec::new();
-    for (face, (count, area_m2)) in counts
-        .into_iter()
-        .zip([y * z, y * z, x * z, x * z])
-        .enumerate()
-    {
-        let area_m2 = count as f64 * area_m2;
+    for (face, area_m2) in areas_m2.into_iter().enumerate() {
         if area_m2 > WORTH_MENTIONING_M2 {
             let side = side_in_words(scan.volume, face / 2, face % 2 == 1);
             remarks.push(Remark::new(format!(
-                "the field of view cuts the body on its {side} side, over {:.0} cm2: the skin is \
-                 missing there, and the surface ends at the cut",
+                "the field of view cuts the body on its {side} side, over {:.0} cm2: no skin was seen there, where \
+                 nothing may enter and clearances are not evaluated",
                 1e4 * area_m2
             )));
             sides.push(side);
         }
     }
     sides
-}
-
-/// Radius in voxels of the circle outside which a scanner has filled everything with one value; none if there is none.
-fn padding_circle(volume: &Volume) -> Option<f64> {
-    let [nx, ny, nz] = volume.grid.size();
-    let middle = [0.5 * (nx - 1) as f64, 0.5 * (ny - 1) as f64];
-    let mut radius: f64 = 0.0;
-    for j in 0..ny {
-        for i in 0..nx {
-            if volume.hu[volume.grid.offset([i, j, nz / 2])] != AIR_HU {
-                radius = radius.max(libm::hypot(i as f64 - middle[0], j as f64 - middle[1]));
-            }
-        }
-    }
-    // Not the half diagonal: the corners are empty. Not far inside: air without noise would do that.
-    let half = 0.5 * nx.min(ny) as f64;
-    (0.9 * half..1.02 * half)
-        .contains(&radius)
-        .then_some(radius)
 }

@@ -9,6 +9,7 @@ mod lungs;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{ImagingError, Remark};
+use crate::field_of_view::FieldOfView;
 use crate::mask::{IndexBox, Mask};
 use crate::spacing::{orthogonal, whole};
 use crate::volume::Volume;
@@ -87,22 +88,17 @@ impl Levels {
     }
 }
 
-/// Finds body, lungs, airways, vessels and bone.
+/// Finds body, lungs, airways, vessels and bone in what a scan has `seen`.
 ///
 /// # Errors
 /// If the grid is sheared, nothing is denser than air, or it was told to stop.
 pub fn segment(
     volume: &Volume,
+    seen: &FieldOfView,
     levels: &Levels,
     cancel: &AtomicBool,
 ) -> Result<Segmentation, ImagingError> {
-    if volume.hu.len() != volume.grid.len() {
-        return Err(ImagingError::refused(format!(
-            "the grid has {} voxels, the data {}",
-            volume.grid.len(),
-            volume.hu.len()
-        )));
-    }
+    check_complete(volume)?;
     let scan = Scan {
         volume,
         spacing_m: orthogonal(&volume.grid)?,
@@ -110,7 +106,7 @@ pub fn segment(
         cancel,
     };
     let mut remarks = Vec::new();
-    let body = body::find(&scan, &mut remarks)?;
+    let body = body::find(&scan, seen, &mut remarks)?;
     let lungs = lungs::find(&scan, &body, &mut remarks)?;
     let bone = bone::find(&scan, &body, &lungs, &mut remarks)?;
     Ok(Segmentation {
@@ -119,6 +115,18 @@ pub fn segment(
         bone,
         remarks,
     })
+}
+
+/// Whether there is a value for each voxel.
+pub(crate) fn check_complete(volume: &Volume) -> Result<(), ImagingError> {
+    if volume.hu.len() == volume.grid.len() {
+        return Ok(());
+    }
+    Err(ImagingError::refused(format!(
+        "the grid has {} voxels, the data {}",
+        volume.grid.len(),
+        volume.hu.len()
+    )))
 }
 
 /// A volume that is looked at.

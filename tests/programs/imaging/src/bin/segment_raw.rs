@@ -12,8 +12,9 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::Point3;
 use needlebench_imaging::{
-    Components, Connectivity, DistanceField, DistanceOptions, IndexBox, LesionSeed, Levels, Mask,
-    ReconstructOptions, Volume, VoxelGrid, dilated, eroded, label_map, reconstruct, segment,
+    Components, Connectivity, DistanceField, DistanceOptions, FieldOfView, IndexBox, LesionSeed,
+    Levels, Mask, ReconstructOptions, Volume, VoxelGrid, dilated, eroded, label_map, reconstruct,
+    segment,
 };
 
 type Failure = Box<dyn std::error::Error>;
@@ -87,7 +88,12 @@ fn parts(volume: &Volume, out: &Path, report: &mut String) -> Result<(), Failure
     let opened = dilated(&shrunk, 3e-3, volume.grid.spacing_m());
     time("opening", start);
     let start = cpu_s();
-    let found = segment(volume, &Levels::default(), &cancel)?;
+    let found = segment(
+        volume,
+        &FieldOfView::of(volume),
+        &Levels::default(),
+        &cancel,
+    )?;
     time("segment", start);
     let start = cpu_s();
     let (labels, facts) = label_map(volume, &found, &[]);

@@ -1,0 +1,332 @@
+//! What a scan has seen: the space of its slices, less what a scanner fills around its circle.
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use needlebench_geometry::TriangleMesh;
+
+use crate::grid::VoxelGrid;
+use crate::volume::{AIR_HU, Volume};
+
+/// Slices that are looked at for padding.
+const SLICES: usize = 32;
+
+/// Straight sides that stand for a round field of view: beyond a circle of 500 mm by 0.3 mm at most.
+const SIDES: usize = 64;
+
+/// Share of a convex outline that pixels with values fill.
+const IS_CONVEX: f64 = 0.985;
+
+/// Least share of the outline that has values in each slice: half where air is clipped to the value of padding.
+const IS_FILLED: f64 = 0.4;
+
+/// Values above this are no air, HU.
+const DENSE_HU: i16 = -480;
+
+/// Blur around what is dense, pixels: values there are no noise of air.
+const BLUR_PIXELS: usize = 4;
+
+/// Share of an outline that is noise of air, or cut tissue at its rim, where it is a field of view and not the outline of
+/// a body in air without noise.
+const IS_NOISE: f64 = 0.01;
+
+/// Skin so near to a side may be the cut itself, pixels.
+const RIM_PIXELS: f64 = 1.5;
+
+/// Skin so near to the centres of the first and last slice is not told from the cut, m (assumed).
+const END_M: f64 = 5e-3;
+
+/// A plane beyond which skin was not seen, in `ct`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cut {
+    /// Away from what was seen.
+    pub normal: UnitVector3<f64>,
+    /// Points `p` with `normal . p` above this are beyond, m.
+    pub offset_m: f64,
+}
+
+impl Cut {
+    fn depth_m(&self, point: &Point3<f64>) -> f64 {
+        self.offset_m - self.normal.dot(&point.coords)
+    }
+}
+
+/// What a scan has seen: a convex region through all slices.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldOfView {
+    /// Through the centres of the first and the last slice.
+    ends: [Cut; 2],
+    /// Through the centres of the outermost voxels.
+    sides: Vec<Cut>,
+    /// Larger spacing within slices, m.
+    pixel_m: f64,
+}
+
+impl FieldOfView {
+    /// Of a volume with a value for each voxel: all of them, or those within the convex outline outside which all slices have padding.
+    pub fn of(volume: &Volume) -> Self {
+        let grid = &volume.grid;
+        let [nx, ny, _] = grid.size();
+        let outline = Outline::of(volume);
+        let along = |normal: [f64; 3], most: f64| plane(grid, normal, most);
+        let [x, y, _] = grid.spacing_m();
+        let round = outline.sides([x, y]);
+        let sides = match round {
+            Some(sides) => sides
+                .into_iter()
+                .map(|([a, b], most)| along([a, b, 0.0], most))
+                .collect(),
+            None => vec![
+                along([-1.0, 0.0, 0.0], 0.0),
+                along([1.0, 0.0, 0.0], (nx - 1) as f64),
+                along([0.0, -1.0, 0.0], 0.0),
+                along([0.0, 1.0, 0.0], (ny - 1) as f64),
+            ],
+        };
+        let [first, last] = outline.slices.map(|slice| slice as f64);
+        Self {
+            ends: [
+                along([0.0, 0.0, -1.0], -first),
+                along([0.0, 0.0, 1.0], last),
+            ],
+            sides,
+            pixel_m: x.max(y),
+        }
+    }
+
+    /// Distance from the nearest side, m, negative beyond it, and its outward normal.
+    pub(crate) fn nearest_side(&self, point: &Point3<f64>) -> Option<(f64, UnitVector3<f64>)> {
+        let sides = self.sides.iter();
+        sides
+            .map(|side| (side.depth_m(point), side.normal))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Planes beyond which a skin was not seen: both ends, and the sides that it reaches.
+    pub fn cuts(&self, skin: &TriangleMesh) -> Vec<Cut> {
+        let inset = |cut: &Cut, by_m: f64| Cut {
+            offset_m: cut.offset_m - by_m,
+            ..*cut
+        };
+        let reaches = |cut: &Cut| skin.vertices_m.iter().any(|at| cut.depth_m(at) < 0.0);
+        let ends = self.ends.iter().map(|end| inset(end, END_M));
+        let sides = self.sides.iter();
+        let sides = sides.map(|side| inset(side, RIM_PIXELS * self.pixel_m));
+        ends.chain(sides.filter(reaches)).collect()
+    }
+}
+
+/// The plane `normal . index = most` of a grid, in `ct`.
+fn plane(grid: &VoxelGrid, normal: [f64; 3], most: f64) -> Cut {
+    // Along a row of the inverse of the steps: an index grows by 1 over a step, whatever the others do.
+    let steps = grid.steps_m();
+    let [i, j, k] = [0, 1, 2].map(|axis| steps.column(axis).into_owned());
+    let volume = i.dot(&j.cross(&k));
+    let rows = [j.cross(&k), k.cross(&i), i.cross(&j)].map(|row| row / volume);
+    let normal: Vector3<f64> = (0..3).map(|axis| normal[axis] * rows[axis]).sum();
+    let length = normal.norm();
+    Cut {
+        normal: UnitVector3::new_normalize(normal),
+        offset_m: (most + normal.dot(&grid.first_m().coords)) / length,
+    }
+}
+
+/// Pixels that have another value than padding in any slice.
+struct Outline {
+    size: [usize; 2],
+    has_value: Vec<bool>,
+    is_dense: Vec<bool>,
+    /// Pixels with a value in the slice that has the fewest.
+    fewest: usize,
+    /// First and last slice with any value.
+    slices: [usize; 2],
+}
+
+impl Outline {
+    fn of(volume: &Volume) -> Self {
+        let [nx, ny, nz] = volume.grid.size();
+        let slice = |k: usize| &volume.hu[k * nx * ny..(k + 1) * nx * ny];
+        let has_any = |k: &usize| slice(*k).iter().any(|&hu| hu != AIR_HU);
+        let first = (0..nz).find(has_any).unwrap_or(0);
+        let last = (0..nz).rev().find(has_any).unwrap_or(nz - 1);
+        let mut made = Self {
+            size: [nx, ny],
+            has_value: vec![false; nx * ny],
+            is_dense: vec![false; nx * ny],
+            fewest: nx * ny,
+            slices: [first, last],
+        };
+        for k in (first..=last).step_by((last - first + 1).div_ceil(SLICES)) {
+            let mut count = 0;
+            let pixels = made.has_value.iter_mut().zip(&mut made.is_dense);
+            for (&hu, (has_value, is_dense)) in slice(k).iter().zip(pixels) {
+                *has_value |= hu != AIR_HU;
+                *is_dense |= hu > DENSE_HU;
+                count += usize::from(hu != AIR_HU);
+            }
+            made.fewest = made.fewest.min(count);
+        }
+        made
+    }
+
+    /// Sides of a field of view that is less than the image: normals in index, scaled to m, and the most along them.
+    fn sides(&self, [x, y]: [f64; 2]) -> Option<Vec<([f64; 2], f64)>> {
+        let [nx, ny] = self.size;
+        let count = self.has_value.iter().filter(|&&has| has).count();
+        let is_part = count > 0 && count < nx * ny;
+        if !is_part || (self.fewest as f64) < IS_FILLED * count as f64 {
+            return None;
+        }
+        // First and last pixel of each row.
+        let rows: Vec<(usize, usize, usize)> = (0..ny)
+            .filter_map(|j| {
+                let row = &self.has_value[j * nx..(j + 1) * nx];
+                let first = row.iter().position(|&has| has)?;
+                let last = row.iter().rposition(|&has| has)?;
+                Some((j, first, last))
+            })
+            .collect();
+        let sides: Vec<([f64; 2], f64)> = (0..SIDES)
+            .map(|side| {
+                let angle = std::f64::consts::TAU * side as f64 / SIDES as f64;
+                let [a, b] = [x * libm::cos(angle), y * libm::sin(angle)];
+                let ends = rows.iter().flat_map(|&(j, first, last)| {
+                    [first, last].map(|i| a * i as f64 + b * j as f64)
+                });
+                ([a, b], ends.fold(f64::NEG_INFINITY, f64::max))
+            })
+            .collect();
+        let rounding = 1e-6 * x.max(y);
+        let is_within = |i: usize, j: usize| {
+            let mut all = sides.iter();
+            all.all(|([a, b], most)| a * i as f64 + b * j as f64 <= most + rounding)
+        };
+        let within = (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j)));
+        let within = within.filter(|&(i, j)| is_within(i, j)).count();
+        let is_convex = count as f64 >= IS_CONVEX * within as f64;
+        (is_convex && self.is_field_of_view(count)).then_some(sides)
+    }
+
+    /// Whether air has noise within the outline, or tissue ends at its rim: else it is that of a body.
+    fn is_field_of_view(&self, count: usize) -> bool {
+        let [nx, ny] = self.size;
+        let is_near_dense = |i: usize, j: usize| {
+            let reach = |at: usize, size: usize| {
+                at.saturating_sub(BLUR_PIXELS)..=(at + BLUR_PIXELS).min(size - 1)
+            };
+            reach(j, ny).any(|j| reach(i, nx).any(|i| self.is_dense[j * nx + i]))
+        };
+        let is_rim = |i: usize, j: usize| {
+            let beside = [
+                (i > 0).then(|| j * nx + i - 1),
+                (i + 1 < nx).then(|| j * nx + i + 1),
+                (j > 0).then(|| (j - 1) * nx + i),
+                (j + 1 < ny).then(|| (j + 1) * nx + i),
+            ];
+            beside.into_iter().flatten().any(|at| !self.has_value[at])
+        };
+        let (mut noise, mut rim, mut cut) = (0, 0, 0);
+        for (i, j) in (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j))) {
+            let at = j * nx + i;
+            if !self.has_value[at] {
+                continue;
+            }
+            if is_rim(i, j) {
+                rim += 1;
+                cut += usize::from(self.is_dense[at]);
+            }
+            noise += usize::from(!self.is_dense[at] && !is_near_dense(i, j));
+        }
+        noise as f64 >= IS_NOISE * count as f64 || cut as f64 >= IS_NOISE * f64::from(rim)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: [usize; 3] = [120, 100, 6];
+    const SPACING_M: [f64; 3] = [2e-3, 2e-3, 4e-3];
+    /// Off the middle of the image, mm.
+    const CENTRE_MM: [f64; 2] = [130.0, 90.0];
+    const RADIUS_MM: f64 = 80.0;
+
+    /// A volume by place within the slice, mm, and noise of -20 to 20 HU.
+    fn volume(hu: impl Fn([f64; 2], i16) -> i16) -> Volume {
+        let [nx, ny, nz] = SIZE;
+        let voxels = (0..nx * ny * nz).map(|at| {
+            let place = [(at % nx) as f64 * 2.0, (at / nx % ny) as f64 * 2.0];
+            let noise = (at.wrapping_mul(2_654_435_761) >> 7) % 41;
+            hu(place, i16::try_from(noise).unwrap() - 20)
+        });
+        Volume {
+            hu: voxels.collect(),
+            grid: VoxelGrid::aligned(SIZE, SPACING_M, Point3::origin()).unwrap(),
+            slice_thickness_m: None,
+        }
+    }
+
+    fn from_centre_mm([x, y]: [f64; 2]) -> f64 {
+        libm::hypot(x - CENTRE_MM[0], y - CENTRE_MM[1])
+    }
+
+    /// Least distance of the centre from a side, m.
+    fn from_sides_m(seen: &FieldOfView) -> f64 {
+        let [x, y] = CENTRE_MM;
+        let centre = Point3::new(1e-3 * x, 1e-3 * y, 8e-3);
+        seen.nearest_side(&centre).unwrap().0
+    }
+
+    #[test]
+    fn circle_off_the_middle_is_found_to_a_pixel() {
+        let scan = volume(|place, noise| {
+            if from_centre_mm(place) > RADIUS_MM {
+                AIR_HU
+            } else {
+                AIR_HU + noise
+            }
+        });
+        let seen = FieldOfView::of(&scan);
+        assert_eq!(seen.sides.len(), SIDES);
+        let off_m = from_sides_m(&seen) - 1e-3 * RADIUS_MM;
+        assert!((-2e-3..=0.0).contains(&off_m), "{off_m}");
+        // A body that fills the circle, too.
+        let scan = volume(|place, _| {
+            if from_centre_mm(place) > RADIUS_MM {
+                AIR_HU
+            } else {
+                40
+            }
+        });
+        assert_eq!(FieldOfView::of(&scan).sides.len(), SIDES);
+    }
+
+    #[test]
+    fn outline_of_a_body_in_air_without_noise_is_no_field_of_view() {
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "between air and soft tissue"
+        )]
+        let scan = volume(|place, _| {
+            // Blurred over 6 mm.
+            let share = ((RADIUS_MM - from_centre_mm(place)) / 6.0).clamp(0.0, 1.0);
+            (-1000.0 + 1040.0 * share) as i16
+        });
+        assert_eq!(FieldOfView::of(&scan).sides.len(), 4);
+        let scan = volume(|_, noise| AIR_HU + noise);
+        assert_eq!(FieldOfView::of(&scan).sides.len(), 4);
+    }
+
+    #[test]
+    fn sides_of_leaning_slices_lean() {
+        let mut scan = volume(|_, noise| AIR_HU + noise);
+        let steps = nalgebra::Matrix3::new(2e-3, 0.0, 0.0, 0.0, 2e-3, 1e-3, 0.0, 0.0, 4e-3);
+        scan.grid = VoxelGrid::new(SIZE, steps, Point3::origin()).unwrap();
+        let seen = FieldOfView::of(&scan);
+        // Voxels in the middle of a side, of the first and the last slice, are on it.
+        for k in [0.0, 5.0] {
+            let place = scan.grid.ct_from_index(&Point3::new(60.0, 99.0, k));
+            let (depth_m, normal) = seen.nearest_side(&place).unwrap();
+            assert!(depth_m.abs() < 1e-12, "{depth_m}");
+            assert!(normal.y > 0.9 && normal.z < -0.1, "{normal:?}");
+        }
+    }
+}
