@@ -5,6 +5,7 @@ use nalgebra::Point3;
 use crate::components::{Components, Connectivity};
 use crate::error::{ImagingError, Remark};
 use crate::field_of_view::FieldOfView;
+use crate::histogram::HuHistogram;
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::{dilated, opened};
 
@@ -18,6 +19,9 @@ const BED_HALF_THICKNESS_M: f64 = 3e-3;
 
 /// A patient, or a phantom, is not smaller.
 const LEAST_BODY_L: f64 = 0.05;
+
+/// Share of a volume without air that no body has: even a field of view within a chest has lungs.
+const FILLED: f64 = 0.9;
 
 /// Something beside the body that is worth a remark.
 const OTHER_PART_L: f64 = 0.2;
@@ -57,6 +61,7 @@ pub(super) fn find(
 ) -> Result<Body, ImagingError> {
     let level = below(scan.levels.skin_hu);
     let tissue = Mask::of(scan.size(), &scan.volume.hu, |hu| hu > level);
+    check_units(scan, &tissue)?;
     scan.check()?;
     let solid = without_bed(scan, &tissue, remarks)?;
     scan.check()?;
@@ -82,6 +87,38 @@ pub(super) fn find(
         cut_sides,
         contact_m2,
     })
+}
+
+/// Refuses lengths and values that are none of a patient.
+fn check_units(scan: &Scan<'_>, tissue: &Mask) -> Result<(), ImagingError> {
+    let voxels = scan.volume.hu.len();
+    if scan.litres(voxels) < LEAST_BODY_L {
+        let size_mm = scan.size().into_iter().zip(scan.spacing_m);
+        let size_mm: Vec<String> = size_mm
+            .map(|(count, step_m)| format!("{:.2}", 1e3 * count as f64 * step_m))
+            .collect();
+        return Err(ImagingError::refused(format!(
+            "the whole volume is {} mm large, less than {LEAST_BODY_L} l",
+            size_mm.join(" x ")
+        ))
+        .hint("are the file's lengths in metres, where it says millimetres?"));
+    }
+    let share = tissue.count() as f64 / voxels as f64;
+    let histogram = HuHistogram::sampled(&scan.volume.hu);
+    if share < FILLED || histogram.has_air_peak() {
+        return Ok(());
+    }
+    let air = histogram.air_peak_hu().map_or_else(
+        || "nothing is below -500 HU".to_owned(),
+        |peak| format!("the most frequent value below -500 HU is {peak}"),
+    );
+    let least = histogram.range_hu().map_or(0, |[least, _]| least);
+    Err(ImagingError::refused(format!(
+        "{:.0} % of the volume is denser than {SKIN_LEVEL_HU} HU and no air is around a body: {air}, the least value \
+         {least}",
+        1e2 * share
+    ))
+    .hint("values must be Hounsfield units, air -1000 and water 0: check slope and intercept of the file"))
 }
 
 fn nothing_there() -> ImagingError {

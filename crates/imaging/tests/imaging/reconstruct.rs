@@ -455,14 +455,30 @@ fn what_is_no_patient_is_refused() {
             .1
             .contains("levels")
     );
-    // A solid block has no air around it; a single voxel no body.
-    let solid = Volume {
-        hu: vec![40; grid().len()],
-        ..empty
+    // A solid block has no air around it, nor has a chest of which air is 0, or whose values have the other sign.
+    let patient = render(&chest(), grid());
+    for hu in [
+        vec![40; grid().len()],
+        patient.hu.iter().map(|hu| hu + 1000).collect(),
+        patient.hu.iter().map(|hu| -hu).collect(),
+    ] {
+        let other = Volume {
+            hu,
+            ..patient.clone()
+        };
+        let error = run(&other, &options()).err().unwrap();
+        let (_, message) = refusal(&error);
+        assert!(message.contains("no air is around"), "{message}");
+    }
+    let steps_m = SPACING_MM.map(|mm| mm * 1e-6);
+    let in_metres = Volume {
+        grid: VoxelGrid::aligned(SIZE, steps_m, Point3::origin()).unwrap(),
+        ..patient.clone()
     };
-    let made = run(&solid, &options()).unwrap();
-    assert_eq!(made.segmentation.body.cut_sides.len(), 4);
-    let stop = reconstruct(&solid, &options(), 1, &AtomicBool::new(true), &|_, _| {});
+    let error = run(&in_metres, &options()).err().unwrap();
+    let (_, message) = refusal(&error);
+    assert!(message.contains("mm large"), "{message}");
+    let stop = reconstruct(&patient, &options(), 1, &AtomicBool::new(true), &|_, _| {});
     assert_eq!(stop.err(), Some(ImagingError::Interrupted));
 }
 
