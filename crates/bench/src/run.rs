@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use nalgebra::Point3;
-use needlebench_cell::ClearanceClass;
+use nalgebra::{Point3, UnitQuaternion};
+use needlebench_cell::{BodyKind, ClearanceClass};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
 use needlebench_evaluation::report::{
@@ -17,6 +17,8 @@ use needlebench_evaluation::trace::trace;
 use needlebench_evaluation::{
     comparing_engines, criteria_with_limits, excitation as excited, iso9283 as protocol,
 };
+use needlebench_geometry::{PreparedShape, Shape, separation};
+use needlebench_kinematics::Pose;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::GoalPlan;
 use needlebench_scenario::ResolvedScenario;
@@ -124,12 +126,32 @@ fn judge_cuts(report: &mut Report, resolved: &ResolvedScenario) {
     let Some(placed) = &resolved.phantom else {
         return;
     };
-    let phantom_from_world = placed.world_from_phantom.inverse();
+    let world_from_phantom = placed.world_from_phantom;
+    let skin = &placed.phantom.skin().name;
+    let patient = resolved.cell.bodies.iter();
+    let patient = patient.filter(|body| body.kind == BodyKind::Phantom);
+    let limbs = patient.flat_map(|body| &body.solids);
+    let limbs = limbs.filter(|solid| solid.name != *skin);
+    let limbs: Vec<(PreparedShape, Pose)> = limbs
+        .map(|solid| (PreparedShape::new(&solid.shape), solid.parent_from_shape))
+        .collect();
+    let ball = PreparedShape::new(&Shape::Sphere {
+        radius_m: SAME_LIMB_M,
+    });
+    let is_limb = |at: &Point3<f64>| {
+        let at = Pose::from_parts((world_from_phantom * at).into(), UnitQuaternion::identity());
+        let mut limbs = limbs.iter();
+        limbs.any(|(limb, place)| separation(&ball, &at, limb, place).distance_m <= 0.0)
+    };
+    let Some(unseen) = placed.phantom.unseen_body(is_limb) else {
+        return;
+    };
+    let phantom_from_world = world_from_phantom.inverse();
     let is_at_cut = |found: &ClassClearance| {
-        let from_unseen_m = found.witness_points_m.iter().map(|point| {
-            let point = phantom_from_world * Point3::from(*point);
-            placed.phantom.distance_from_unseen_m(&point)
-        });
+        let from_unseen_m = found
+            .witness_points_m
+            .iter()
+            .map(|point| unseen.distance_m(&(phantom_from_world * Point3::from(*point))));
         from_unseen_m.fold(f64::INFINITY, f64::min) <= found.minimum_m.max(0.0) + AT_CUT_M
     };
     let mut left_open = Vec::new();
@@ -181,6 +203,9 @@ const FROM_PATIENT: [ClearanceClass; 3] = [
     ClearanceClass::ToolPhantom,
     ClearanceClass::GuideStandoff,
 ];
+
+/// A cut is that of a limb of the model within this, m (assumed: what limbs of people differ by).
+const SAME_LIMB_M: f64 = 0.01;
 
 /// The nearest point is taken for one of the cut so near to it, m: what breath and registration move a patient.
 const AT_CUT_M: f64 = 5e-3;

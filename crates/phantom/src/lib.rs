@@ -43,8 +43,8 @@ pub use route_obstacles::{RouteObstacle, RouteObstacles};
 use envelope::Envelope;
 pub use half_spaces::HalfSpaces;
 pub use limbs::{Support, limbs};
-pub use scan_ends::ScanEnd;
 use scan_ends::ScanEnds;
+pub use scan_ends::{ScanEnd, UnseenBody};
 pub use skin::SkinSurface;
 
 /// Colour of the skin.
@@ -262,11 +262,11 @@ impl Phantom {
         ends.is_none_or(|ends| ends.is_seen(point))
     }
 
-    /// How far a point (phantom frame) is from where the body may go on behind the cuts of a scan, m: from the faces of
-    /// the cuts, and from what lies straight behind them. Infinite where nothing is cut.
-    pub fn distance_from_unseen_m(&self, point: &Point3<f64>) -> f64 {
-        let ends = self.scan_ends.as_ref();
-        ends.map_or(f64::INFINITY, |ends| ends.beyond_m(self.skin(), point))
+    /// Where the body may go on behind the cuts of a scan; none where nothing is cut. A cut face is known to go on as
+    /// something else where all its corners (phantom frame) are in what is modelled, such as the arms.
+    pub fn unseen_body(&self, is_modelled: impl Fn(&Point3<f64>) -> bool) -> Option<UnseenBody> {
+        let ends = self.scan_ends.as_ref()?;
+        ends.unseen_body(self.skin(), is_modelled)
     }
 
     /// Bones, vessels, organs and fissures, ready for distances; prepared once.

@@ -1,7 +1,5 @@
 //! Where a scan cuts the body.
 
-use std::sync::OnceLock;
-
 use nalgebra::{Point3, UnitVector3};
 use needlebench_geometry::mesh::SurfaceIndex;
 use needlebench_geometry::{Solid, TriangleMesh};
@@ -17,26 +15,31 @@ pub struct ScanEnd {
     pub offset_m: f64,
 }
 
-/// The ends of a scan, and the faces at which they cut the body.
-#[derive(Debug, Clone)]
+/// The ends of a scan.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ScanEnds {
     ends: Vec<ScanEnd>,
     seen: HalfSpaces,
-    faces: OnceLock<Option<Faces>>,
 }
 
-/// How the body is cut.
+/// Where a body may go on behind the ends of its scan: the faces of the cuts, and what lies straight behind them.
 #[derive(Debug, Clone)]
-struct Faces {
-    surface: SurfaceIndex,
-    /// How far the body goes along the normal of each end, m.
-    reach_m: Vec<f64>,
+pub struct UnseenBody {
+    faces: SurfaceIndex,
+    /// Normals of the ends, and how far the body goes along them, m.
+    reaches: Vec<(UnitVector3<f64>, f64)>,
 }
 
-/// Faces follow from ends and skin.
-impl PartialEq for ScanEnds {
-    fn eq(&self, other: &Self) -> bool {
-        self.ends == other.ends
+impl UnseenBody {
+    /// How far a point (phantom frame) is from it, m.
+    pub fn distance_m(&self, point: &Point3<f64>) -> f64 {
+        // Back along the normal of each end to where the body was cut.
+        let mut point = *point;
+        for (normal, reach_m) in &self.reaches {
+            let behind_m = normal.dot(&point.coords) - reach_m;
+            point -= behind_m.max(0.0) * normal.into_inner();
+        }
+        self.faces.distance_m(&point)
     }
 }
 
@@ -45,7 +48,6 @@ impl ScanEnds {
         Self {
             seen: HalfSpaces::new(ends.iter().map(|end| (end.normal, end.offset_m))),
             ends,
-            faces: OnceLock::new(),
         }
     }
 
@@ -54,23 +56,12 @@ impl ScanEnds {
         self.seen.depth_m(point) >= 0.0
     }
 
-    /// How far a point is from where the body may go on: from the cut faces, and from what lies straight behind them, m.
-    /// Infinite where nothing is cut.
-    pub fn beyond_m(&self, skin: &Solid, point: &Point3<f64>) -> f64 {
-        let faces = self.faces.get_or_init(|| self.faces(skin));
-        let Some(faces) = faces else {
-            return f64::INFINITY;
-        };
-        // Back along the normal of each end to where the body was cut.
-        let mut point = *point;
-        for (end, reach_m) in self.ends.iter().zip(&faces.reach_m) {
-            let behind_m = end.normal.dot(&point.coords) - reach_m;
-            point -= behind_m.max(0.0) * end.normal.into_inner();
-        }
-        faces.surface.distance_m(&point)
-    }
-
-    fn faces(&self, skin: &Solid) -> Option<Faces> {
+    /// See `Phantom::unseen_body`.
+    pub fn unseen_body(
+        &self,
+        skin: &Solid,
+        is_modelled: impl Fn(&Point3<f64>) -> bool,
+    ) -> Option<UnseenBody> {
         // A polyhedron is its own surface, whatever the fineness.
         let TriangleMesh {
             mut vertices_m,
@@ -79,22 +70,29 @@ impl ScanEnds {
         for vertex in &mut vertices_m {
             *vertex = skin.parent_from_shape * *vertex;
         }
-        let reach_m = self.ends.iter().map(|end| {
+        let reaches = self.ends.iter().map(|end| {
             let along_m = vertices_m.iter().map(|at| end.normal.dot(&at.coords));
-            along_m.fold(f64::NEG_INFINITY, f64::max)
+            (end.normal, along_m.fold(f64::NEG_INFINITY, f64::max))
         });
-        let reach_m = reach_m.collect();
-        let is_cut: Vec<bool> = vertices_m.iter().map(|at| !self.is_seen(at)).collect();
+        let reaches = reaches.collect();
+        let is_cut = |at: &Point3<f64>| !self.is_seen(at);
+        let is_cut: Vec<bool> = vertices_m.iter().map(is_cut).collect();
         let triangles: Vec<_> = triangles
             .into_iter()
-            .filter(|corners| corners.iter().all(|&corner| is_cut[corner as usize]))
+            .filter(|corners| {
+                let corners = corners.map(|corner| corner as usize);
+                corners.iter().all(|&corner| is_cut[corner])
+                    && !corners
+                        .iter()
+                        .all(|&corner| is_modelled(&vertices_m[corner]))
+            })
             .collect();
-        (!triangles.is_empty()).then(|| Faces {
-            surface: SurfaceIndex::new(TriangleMesh {
+        (!triangles.is_empty()).then(|| UnseenBody {
+            faces: SurfaceIndex::new(TriangleMesh {
                 vertices_m,
                 triangles,
             }),
-            reach_m,
+            reaches,
         })
     }
 }

@@ -601,10 +601,7 @@ fn volumes_are_as_documented() {
 fn a_cut_body_may_go_on_behind_its_cut() {
     let whole = Phantom::build(&Phantom::size_preset("male-p50-supine").unwrap()).unwrap();
     assert!(whole.is_skin_seen(&Point3::new(0.0, 0.0, 1.0)));
-    assert_eq!(
-        whole.distance_from_unseen_m(&Point3::origin()),
-        f64::INFINITY
-    );
+    assert!(whole.unseen_body(|_| false).is_none());
     let half_m = 0.5e-3 * whole.parameters.as_ref().unwrap().length_mm;
     let cut = whole.with_scan_ends(vec![ScanEnd {
         normal: Vector3::z_axis(),
@@ -612,20 +609,22 @@ fn a_cut_body_may_go_on_behind_its_cut() {
     }]);
     assert!(cut.is_skin_seen(&Point3::new(0.0, 0.0, half_m - 6e-3)));
     assert!(!cut.is_skin_seen(&Point3::new(0.0, 0.0, half_m - 4e-3)));
+    assert!(cut.unseen_body(|_| true).is_none());
+    let unseen = cut.unseen_body(|_| false).unwrap();
     for (place, wanted_m) in [
         // On the face, before it, and straight behind it at any distance.
         ([0.0, 0.0, half_m], 0.0),
         ([0.0, 0.0, half_m - 0.1], 0.1),
         ([0.0, 0.0, half_m + 0.4], 0.0),
     ] {
-        let distance_m = cut.distance_from_unseen_m(&Point3::from(place));
+        let distance_m = unseen.distance_m(&Point3::from(place));
         assert!(
             (distance_m - wanted_m).abs() < ROUNDING_M,
             "{place:?} {distance_m}"
         );
     }
     // Beside what lies behind it: as far as from the face's rim.
-    let beside = |z: f64| cut.distance_from_unseen_m(&Point3::new(0.5, 0.0, z));
+    let beside = |z: f64| unseen.distance_m(&Point3::new(0.5, 0.0, z));
     assert!((beside(half_m + 0.4) - beside(half_m)).abs() < ROUNDING_M);
     assert!(beside(half_m) > 0.2);
 }
