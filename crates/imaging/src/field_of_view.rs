@@ -24,9 +24,17 @@ const DENSE_HU: i16 = -480;
 /// Blur around what is dense, pixels: values there are no noise of air.
 const BLUR_PIXELS: usize = 4;
 
-/// Share of an outline that is noise of air, or cut tissue at its rim, where it is a field of view and not the outline of
-/// a body in air without noise.
+/// Share of an outline that is noise of air where it is a field of view and not the outline of a body.
 const IS_NOISE: f64 = 0.01;
+
+/// Share of a rim on the circle around it where a scanner cut it: the tips of an ellipse of 3 by 2 are on it with a fifth.
+const IS_ROUND: f64 = 0.25;
+
+/// Share of what is on that circle that is tissue where it was cut: skin that is blurred by half a pixel has half.
+const IS_CUT: f64 = 0.9;
+
+/// Steps towards the circle around a rim: its radius to 1 %, mostly to 0.1 %.
+const CIRCLE_STEPS: usize = 10_000;
 
 /// Skin so near to a side may be the cut itself, pixels.
 const RIM_PIXELS: f64 = 1.5;
@@ -202,11 +210,11 @@ impl Outline {
         let within = (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j)));
         let within = within.filter(|&(i, j)| is_within(i, j)).count();
         let is_convex = count as f64 >= IS_CONVEX * within as f64;
-        (is_convex && self.is_field_of_view(count)).then_some(sides)
+        (is_convex && self.is_field_of_view(count, [x, y])).then_some(sides)
     }
 
-    /// Whether air has noise within the outline, or tissue ends at its rim: else it is that of a body.
-    fn is_field_of_view(&self, count: usize) -> bool {
+    /// Whether air has noise within the outline, or a circle cuts tissue: else it is that of a body in air without noise.
+    fn is_field_of_view(&self, count: usize, spacing: [f64; 2]) -> bool {
         let [nx, ny] = self.size;
         let is_near_dense = |i: usize, j: usize| {
             let reach = |at: usize, size: usize| {
@@ -214,28 +222,61 @@ impl Outline {
             };
             reach(j, ny).any(|j| reach(i, nx).any(|i| self.is_dense[j * nx + i]))
         };
-        let is_rim = |i: usize, j: usize| {
+        let pixels = (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j)));
+        let with_value = pixels.filter(|&(i, j)| self.has_value[j * nx + i]);
+        let air = with_value.filter(|&(i, j)| !self.is_dense[j * nx + i] && !is_near_dense(i, j));
+        air.count() as f64 >= IS_NOISE * count as f64 || self.is_cut_by_circle(spacing)
+    }
+
+    /// Whether the rim is tissue on a circle: a sharp outline of another form is that of a body.
+    fn is_cut_by_circle(&self, [x, y]: [f64; 2]) -> bool {
+        let rim = self.rim();
+        let places: Vec<[f64; 2]> = rim
+            .iter()
+            .map(|&(i, j)| [x * i as f64, y * j as f64])
+            .collect();
+        let Some(&first) = places.first() else {
+            return false;
+        };
+        // Towards the farthest, by ever less: Badoiu and Clarkson, SODA 2003.
+        let squared = |[x, y]: [f64; 2], at: &[f64; 2]| (at[0] - x).powi(2) + (at[1] - y).powi(2);
+        let farthest = |centre: [f64; 2]| {
+            let all = places.iter();
+            all.max_by(|a, b| squared(centre, a).total_cmp(&squared(centre, b)))
+        };
+        let mut centre = first;
+        for step in 0..CIRCLE_STEPS {
+            if let Some(far) = farthest(centre) {
+                let share = 1.0 / (step + 2) as f64;
+                centre = [0, 1].map(|axis| centre[axis] + share * (far[axis] - centre[axis]));
+            }
+        }
+        let radius = farthest(centre).map_or(0.0, |far| squared(centre, far).sqrt());
+        let (mut on_circle, mut cut) = (0, 0);
+        for (&(i, j), place) in rim.iter().zip(&places) {
+            if squared(centre, place).sqrt() >= radius - RIM_PIXELS * x.max(y) {
+                on_circle += 1;
+                cut += usize::from(self.is_dense[j * self.size[0] + i]);
+            }
+        }
+        f64::from(on_circle) >= IS_ROUND * rim.len() as f64
+            && cut as f64 >= IS_CUT * f64::from(on_circle)
+    }
+
+    /// Pixels with a value beside one without.
+    fn rim(&self) -> Vec<(usize, usize)> {
+        let [nx, ny] = self.size;
+        let is_rim = |&(i, j): &(usize, usize)| {
             let beside = [
                 (i > 0).then(|| j * nx + i - 1),
                 (i + 1 < nx).then(|| j * nx + i + 1),
                 (j > 0).then(|| (j - 1) * nx + i),
                 (j + 1 < ny).then(|| (j + 1) * nx + i),
             ];
-            beside.into_iter().flatten().any(|at| !self.has_value[at])
+            self.has_value[j * nx + i] && beside.into_iter().flatten().any(|at| !self.has_value[at])
         };
-        let (mut noise, mut rim, mut cut) = (0, 0, 0);
-        for (i, j) in (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j))) {
-            let at = j * nx + i;
-            if !self.has_value[at] {
-                continue;
-            }
-            if is_rim(i, j) {
-                rim += 1;
-                cut += usize::from(self.is_dense[at]);
-            }
-            noise += usize::from(!self.is_dense[at] && !is_near_dense(i, j));
-        }
-        noise as f64 >= IS_NOISE * count as f64 || cut as f64 >= IS_NOISE * f64::from(rim)
+        let pixels = (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j)));
+        pixels.filter(is_rim).collect()
     }
 }
 
@@ -300,6 +341,17 @@ mod tests {
     }
 
     #[test]
+    fn body_in_air_without_noise_that_a_circle_cuts_left_and_right_is_cut() {
+        let scan = volume(|place, _| {
+            let is_within = from_centre_mm(place) < RADIUS_MM;
+            let is_body = (30.0..140.0).contains(&place[1]);
+            if is_within && is_body { 40 } else { AIR_HU }
+        });
+        let seen = FieldOfView::of(&scan);
+        assert_eq!(seen.sides.len(), SIDES);
+    }
+
+    #[test]
     fn outline_of_a_body_in_air_without_noise_is_no_field_of_view() {
         #[expect(
             clippy::cast_possible_truncation,
@@ -309,6 +361,12 @@ mod tests {
             // Blurred over 6 mm.
             let share = ((RADIUS_MM - from_centre_mm(place)) / 6.0).clamp(0.0, 1.0);
             (-1000.0 + 1040.0 * share) as i16
+        });
+        assert_eq!(FieldOfView::of(&scan).sides.len(), 4);
+        // An ellipse with a sharp rim.
+        let scan = volume(|[x, y], _| {
+            let [x, y] = [(x - CENTRE_MM[0]) / 90.0, (y - CENTRE_MM[1]) / 60.0];
+            if x * x + y * y > 1.0 { AIR_HU } else { 40 }
         });
         assert_eq!(FieldOfView::of(&scan).sides.len(), 4);
         let scan = volume(|_, noise| AIR_HU + noise);
