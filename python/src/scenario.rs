@@ -371,13 +371,13 @@ impl Job {
                 };
                 let files = BuildFiles {
                     labels: true,
-                    volume: false,
+                    ..BuildFiles::default()
                 };
                 let folder = folder.join("ct");
                 let made = std::fs::create_dir_all(&folder)
                     .map_err(|error| Failure::Environment(error.to_string()));
                 made?;
-                imaged(resolved, &folder, &self.overrides, files, None, &control)
+                imaged(resolved, &folder, &self.overrides, &files, None, &control)
                     .map_err(|stop| match stop {
                         Stop::Interrupted => Failure::Interrupted,
                         Stop::Refused(findings) => Failure::Input(findings),

@@ -155,8 +155,8 @@ fn judge_cuts(report: &mut Report, resolved: &ResolvedScenario) {
         from_unseen_m.fold(f64::INFINITY, f64::min) <= found.minimum_m.max(0.0) + AT_CUT_M
     };
     let mut left_open = Vec::new();
-    for goal in &mut report.goals {
-        for configuration in &mut goal.configurations {
+    for goal in &report.goals {
+        for configuration in &goal.configurations {
             if configuration.status == Status::Rejected {
                 continue;
             }
@@ -178,23 +178,11 @@ fn judge_cuts(report: &mut Report, resolved: &ResolvedScenario) {
                     }
                     None => {}
                 }
-                configuration.not_judged += 1;
-                left_open.push(NotJudged {
-                    goal: goal.name.clone(),
-                    label: Some(configuration.label.to_owned()),
-                    engine: None,
-                    criterion: key,
-                    reason: AT_CUT.to_owned(),
-                    requirement: None,
-                });
+                left_open.push((goal.name.clone(), Some(configuration.label.to_owned()), key));
             }
         }
     }
-    report.not_judged.extend(left_open);
-    report.verdict = Verdict::of(
-        report.verdict == Verdict::Fail,
-        !report.not_judged.is_empty(),
-    );
+    not_judged(report, left_open, AT_CUT);
 }
 
 /// What may be nearer to the patient than a scan shows.
@@ -255,23 +243,36 @@ fn leave_open(report: &mut Report, keys: &[&str], reason: &str) {
     } else if report.excitation.is_some() {
         subjects.push((excited::SUBJECT.to_owned(), None));
     }
-    for goal in &mut report.goals {
-        for configuration in &mut goal.configurations {
+    for goal in &report.goals {
+        for configuration in &goal.configurations {
             if configuration.status != Status::Rejected {
-                configuration.not_judged += keys.len();
                 subjects.push((goal.name.clone(), Some(configuration.label.to_owned())));
             }
         }
     }
-    for (goal, label) in subjects {
-        report.not_judged.extend(keys.iter().map(|key| NotJudged {
-            goal: goal.clone(),
-            label: label.clone(),
+    let all = subjects.into_iter().flat_map(|(goal, label)| {
+        let keys = keys.iter();
+        keys.map(move |key| (goal.clone(), label.clone(), (*key).to_owned()))
+    });
+    not_judged(report, all.collect(), reason);
+}
+
+/// Criteria that are not evaluated, each with the goal and the configuration that it is of.
+fn not_judged(report: &mut Report, all: Vec<(String, Option<String>, String)>, reason: &str) {
+    for (goal, label, criterion) in all {
+        let of_goal = report.goals.iter_mut().filter(|each| each.name == goal);
+        let mut configurations = of_goal.flat_map(|each| &mut each.configurations);
+        if let Some(found) = configurations.find(|each| label.as_deref() == Some(each.label)) {
+            found.not_judged += 1;
+        }
+        report.not_judged.push(NotJudged {
+            goal,
+            label,
             engine: None,
-            criterion: (*key).to_owned(),
+            criterion,
             reason: reason.to_owned(),
             requirement: None,
-        }));
+        });
     }
     report.verdict = Verdict::of(
         report.verdict == Verdict::Fail,

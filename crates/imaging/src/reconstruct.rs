@@ -155,6 +155,18 @@ pub struct Reconstruction {
     pub remarks: Vec<Remark>,
 }
 
+impl Reconstruction {
+    /// The surface of the body; none where there is none.
+    pub fn skin(&self) -> Option<&Surface> {
+        skin_of(&self.surfaces)
+    }
+}
+
+fn skin_of(surfaces: &[Surface]) -> Option<&Surface> {
+    let mut all = surfaces.iter();
+    all.find(|surface| surface.tissue == SurfaceTissue::Skin)
+}
+
 /// Told of each step: what it is, and the share of all steps that is done.
 pub type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
 
@@ -526,10 +538,8 @@ const FARTHEST_BACK_M: f64 = 3e-3;
 /// Moves corners of other surfaces that the reduced skin leaves far outside back towards it. A surface that would not stay
 /// sound is left as it is.
 fn keep_within_skin(surfaces: &mut [Surface], remarks: &mut Vec<Remark>) {
-    let skin = surfaces
-        .iter()
-        .find(|surface| surface.tissue == SurfaceTissue::Skin);
-    let Some(skin) = skin.map(|surface| SurfaceIndex::new(surface.mesh.clone())) else {
+    let Some(skin) = skin_of(surfaces).map(|surface| SurfaceIndex::new(surface.mesh.clone()))
+    else {
         return;
     };
     for surface in surfaces {

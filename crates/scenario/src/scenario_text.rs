@@ -137,6 +137,7 @@ impl Scenario {
         if let Some(phantom) = &mut self.phantom {
             references.push(&mut phantom.model);
             references.extend(phantom.parts.iter_mut().map(|part| &mut part.file));
+            references.extend(phantom.build.iter_mut().map(|build| &mut build.report));
         }
         for obstacle in &mut self.obstacles {
             let shape = &mut obstacle.shape;

@@ -166,7 +166,7 @@ impl Server {
         let address = listener.local_addr().map_err(taken)?;
         let app = App {
             scene: shared::scene(case.desk().scenario()).into(),
-            session: SessionFile::new(case.folder()),
+            session: SessionFile::new(case.folder(), case.built().sha256()),
             writing: tokio::sync::Mutex::new(()),
             simulation: Simulation::new(program, case.folder()),
             hosts: Hosts::new(address.port()),

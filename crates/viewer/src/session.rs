@@ -7,14 +7,12 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use needlebench_bench::ct::SESSION_FILE;
 use needlebench_input::{Finding, from_toml, to_toml};
 use needlebench_report::write_atomically;
 use serde::{Deserialize, Serialize};
 
 use crate::live::{Aim, EntryAim, TargetAim};
-
-/// Its file.
-pub(crate) const SESSION_FILE: &str = "session.toml";
 
 /// Version of the file's layout.
 const SCHEMA_VERSION: u32 = 1;
@@ -34,6 +32,9 @@ pub struct Session {
     schema_version: u32,
     /// Counts the changes.
     pub version: u64,
+    /// SHA-256 of the `report.json` that it is about; none in sessions of folders that were built before it was kept.
+    #[serde(default)]
+    build_sha256: Option<String>,
     /// Everything else.
     #[serde(flatten)]
     pub state: State,
@@ -173,13 +174,15 @@ pub enum NotKept {
 #[derive(Debug)]
 pub struct SessionFile {
     path: PathBuf,
+    build_sha256: String,
 }
 
 impl SessionFile {
-    /// Of a folder; a new one if there is none.
-    pub fn new(folder: &Path) -> Self {
+    /// Of a folder whose `report.json` has this SHA-256; a new one if there is none.
+    pub fn new(folder: &Path, build_sha256: &str) -> Self {
         Self {
             path: folder.join(SESSION_FILE),
+            build_sha256: build_sha256.to_owned(),
         }
     }
 
@@ -195,6 +198,7 @@ impl SessionFile {
                 return Ok(Session {
                     schema_version: SCHEMA_VERSION,
                     version: 0,
+                    build_sha256: Some(self.build_sha256.clone()),
                     state: State::default(),
                 });
             }
@@ -211,6 +215,14 @@ impl SessionFile {
             )
             .key("schema_version")
             .hint(hint));
+        }
+        let is_other = |known: &String| *known != self.build_sha256;
+        if session.build_sha256.as_ref().is_some_and(is_other) {
+            return Err(Finding::new(file, "this is the session of another build")
+                .key("build_sha256")
+                .hint(
+                    "its positions are those of another scan or registration: move the file away",
+                ));
         }
         match session.state.problem() {
             Some(problem) => Err(Finding::new(file, problem).hint(hint)),
@@ -235,6 +247,7 @@ impl SessionFile {
         let session = Session {
             schema_version: SCHEMA_VERSION,
             version: version + 1,
+            build_sha256: Some(self.build_sha256.clone()),
             state,
         };
         let text = to_toml(&session).map_err(NotKept::Wrong)?;
@@ -259,6 +272,8 @@ fn is_far(place: &[f64; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const BUILD: &str = "5f";
 
     fn state() -> State {
         State {
@@ -285,18 +300,18 @@ mod tests {
     #[test]
     fn what_is_kept_is_read_again_to_the_last_bit() {
         let folder = tempfile::tempdir().unwrap();
-        let file = SessionFile::new(folder.path());
+        let file = SessionFile::new(folder.path(), BUILD);
         assert_eq!(file.read().unwrap().version, 0);
         let kept = file.write(0, state()).unwrap();
         assert_eq!(kept.version, 1);
-        assert_eq!(SessionFile::new(folder.path()).read().unwrap(), kept);
+        assert_eq!(SessionFile::new(folder.path(), BUILD).read().unwrap(), kept);
         assert_eq!(kept.state, state());
     }
 
     #[test]
     fn the_second_of_two_writers_is_refused_and_nothing_is_lost() {
         let folder = tempfile::tempdir().unwrap();
-        let file = SessionFile::new(folder.path());
+        let file = SessionFile::new(folder.path(), BUILD);
         let first = file.write(0, state()).unwrap();
         let refused = file.write(0, State::default()).unwrap_err();
         assert_eq!(refused, NotKept::Changed(Box::new(first.clone())));
@@ -304,9 +319,19 @@ mod tests {
     }
 
     #[test]
+    fn a_session_of_another_build_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        SessionFile::new(folder.path(), BUILD)
+            .write(0, state())
+            .unwrap();
+        let refused = SessionFile::new(folder.path(), "60").read().unwrap_err();
+        assert_eq!(refused.key.as_deref(), Some("build_sha256"));
+    }
+
+    #[test]
     fn what_is_no_session_is_refused_with_what_is_wrong() {
         let folder = tempfile::tempdir().unwrap();
-        let file = SessionFile::new(folder.path());
+        let file = SessionFile::new(folder.path(), BUILD);
         fs::write(folder.path().join(SESSION_FILE), "version = \"x\"").unwrap();
         assert!(file.read().unwrap_err().hint.is_some());
         let wrong = [
@@ -331,7 +356,7 @@ mod tests {
     #[test]
     fn a_folder_that_is_gone_is_said() {
         let folder = tempfile::tempdir().unwrap();
-        let file = SessionFile::new(folder.path());
+        let file = SessionFile::new(folder.path(), BUILD);
         folder.close().unwrap();
         assert!(matches!(file.write(0, state()), Err(NotKept::Folder(_))));
     }

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use needlebench_imaging::read::{ReadOptions, read_label_names, read_labels, read_volume};
 use needlebench_imaging::registration::{ReferenceFrame, Registration};
 use needlebench_imaging::{ImagingError, LabelMap, Volume, VoxelGrid};
-use needlebench_input::{Finding, read_text};
+use needlebench_input::{Finding, read_text, sha256_hex};
 use needlebench_scenario::scenario::Scenario;
 use serde::Deserialize;
 
@@ -28,6 +28,9 @@ const BUILD_ANEW: &str = "volume, labels, surfaces and scenario must come from o
 #[derive(Debug, Clone, Deserialize)]
 pub struct BuildFacts {
     schema_version: u32,
+    /// Of the report itself.
+    #[serde(skip)]
+    sha256: String,
     size: [usize; 3],
     spacing_m: [f64; 3],
     first_voxel_m: [f64; 3],
@@ -46,6 +49,13 @@ pub struct BuildFacts {
     pub targets: Vec<TargetFacts>,
     /// Lesions with their sizes.
     pub lesions: Vec<LesionFacts>,
+}
+
+impl BuildFacts {
+    /// Files of the surfaces, relative to the folder.
+    pub(super) fn surface_files(&self) -> impl Iterator<Item = &str> {
+        self.surfaces.iter().map(|surface| surface.file.as_str())
+    }
 }
 
 /// A closed surface.
@@ -158,6 +168,11 @@ impl BuiltFolder {
         &self.facts
     }
 
+    /// SHA-256 of the report: what was made of this build names it.
+    pub fn sha256(&self) -> &str {
+        &self.facts.sha256
+    }
+
     /// What each voxel is. Its grid is the report's, to the last digit, not that of a file of single precision.
     pub fn labels(&self) -> &LabelMap {
         &self.labels
@@ -263,10 +278,12 @@ impl BuiltFolder {
     }
 }
 
-fn read_facts(path: &Path) -> Result<BuildFacts, ImagingError> {
+/// The report at a path.
+pub(super) fn read_facts(path: &Path) -> Result<BuildFacts, ImagingError> {
     let text = read_text(path).map_err(|error| ImagingError::refused(error.to_string()))?;
-    let facts: BuildFacts = serde_json::from_str(&text)
+    let mut facts: BuildFacts = serde_json::from_str(&text)
         .map_err(|error| ImagingError::refused(format!("not written by `ct build`: {error}")))?;
+    facts.sha256 = sha256_hex(text.as_bytes());
     if facts.schema_version == VERSION {
         return Ok(facts);
     }

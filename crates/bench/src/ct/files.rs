@@ -1,17 +1,9 @@
 //! The folder of what was built from a scan.
 
-use std::path::Path;
-use std::sync::atomic::AtomicBool;
-
 use needlebench_imaging::markers::{DetectedMarker, Rejected};
 use needlebench_imaging::read::Description;
 use needlebench_imaging::registration::{MarkerMatch, Registration};
-use needlebench_imaging::write::{write_bytes, write_label_nifti, write_nifti, write_stl};
-use needlebench_imaging::{
-    ImagingError, LabelFacts, LesionSize, Remark, SurfaceError, SurfaceTissue,
-};
-use needlebench_scenario::scenario::Scenario;
-use needlebench_scenario::scenario_text;
+use needlebench_imaging::{LabelFacts, LabelMap, LesionSize, Remark, SurfaceError, SurfaceTissue};
 use serde::Serialize;
 
 use super::patient::{PatientFrame, SURFACES};
@@ -39,6 +31,8 @@ pub struct BuildReport<'b> {
     pub voxels_sha256: Option<String>,
     /// The same of the labels, for `labels.nii.gz`.
     pub labels_sha256: Option<String>,
+    /// SHA-256 of the room and the goals: of what the scenario has that is not of the scan.
+    pub room_sha256: String,
     /// Closed surfaces.
     pub surfaces: Vec<SurfaceReport<'b>>,
     /// Lesions that were asked for, in that order.
@@ -64,6 +58,8 @@ pub struct SurfaceReport<'b> {
     pub tissue: SurfaceTissue,
     /// Its file, in the same folder.
     pub file: String,
+    /// SHA-256 of the file.
+    pub sha256: String,
     /// Triangles.
     pub triangles: usize,
     /// Triangles before they were reduced.
@@ -114,9 +110,17 @@ pub struct MarkersReport<'b> {
     pub matched: Option<&'b MarkerMatch>,
 }
 
+/// SHA-256 of what a build wrote, as lower-case hexadecimal.
+pub(super) struct BuildDigests {
+    /// Of the surfaces' files, in their order.
+    pub surfaces: Vec<String>,
+    /// Of the room and the goals.
+    pub room: String,
+}
+
 impl<'b> BuildReport<'b> {
     /// Of what was built, of which some files are written.
-    pub fn of(build: &'b ScanBuild, files: BuildFiles) -> Self {
+    pub(super) fn of(build: &'b ScanBuild, files: &BuildFiles, digests: BuildDigests) -> Self {
         let grid = &build.seen.volume.grid;
         let made = &build.seen.made;
         Self {
@@ -129,13 +133,16 @@ impl<'b> BuildReport<'b> {
             phantom_origin_m: PatientFrame::of(build).origin_in_ct_m.into(),
             voxels_sha256: files.volume.then(|| build.seen.voxels_sha256().to_owned()),
             labels_sha256: files.labels.then(|| build.seen.labels_sha256().to_owned()),
+            room_sha256: digests.room,
             surfaces: made
                 .surfaces
                 .iter()
-                .map(|surface| SurfaceReport {
+                .zip(digests.surfaces)
+                .map(|(surface, sha256)| SurfaceReport {
                     name: &surface.name,
                     tissue: surface.tissue,
                     file: surface_file(&surface.name),
+                    sha256,
                     triangles: surface.mesh.triangles.len(),
                     triangles_before: surface.triangles_before,
                     volume_m3: surface.volume_m3,
@@ -177,7 +184,8 @@ impl<'b> BuildReport<'b> {
     }
 }
 
-fn surface_file(name: &str) -> String {
+/// The file of a surface, relative to the folder.
+pub(super) fn surface_file(name: &str) -> String {
     format!("{SURFACES}/{name}.stl")
 }
 
@@ -187,19 +195,37 @@ struct LabelName<'b> {
     name: &'b str,
 }
 
+/// Names of labels, as a document.
 #[derive(Serialize)]
-struct LabelNames<'b> {
+pub(super) struct LabelNames<'b> {
     schema_version: u32,
     labels: Vec<LabelName<'b>>,
 }
 
+impl<'b> LabelNames<'b> {
+    /// Those of a label map.
+    pub fn of(map: &'b LabelMap) -> Self {
+        let names = map.names.iter();
+        let names = names.map(|(label, name)| LabelName {
+            label: *label,
+            name,
+        });
+        Self {
+            schema_version: 1,
+            labels: names.collect(),
+        }
+    }
+}
+
 /// What of a build is written besides surfaces, report and scenario.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct BuildFiles {
     /// The label map with its names.
     pub labels: bool,
     /// The volume along the patient's axes: what everything was found in.
     pub volume: bool,
+    /// Images of slices: name and bytes of each.
+    pub slices: Vec<(String, Vec<u8>)>,
 }
 
 /// Name of the scenario in a folder that was built.
@@ -212,69 +238,9 @@ pub(super) const LABELS_FILE: &str = "labels.nii.gz";
 pub(super) const NAMES_FILE: &str = "labels.json";
 /// What was built.
 pub(super) const REPORT_FILE: &str = "report.json";
-
-/// Writes surfaces and report, and what else is wanted; the names of the files.
-///
-/// # Errors
-/// What cannot be written; interrupted.
-pub(crate) fn write_build(
-    folder: &Path,
-    build: &ScanBuild,
-    wanted: BuildFiles,
-    cancel: &AtomicBool,
-) -> Result<Vec<String>, ImagingError> {
-    let mut files = Vec::new();
-    let surfaces = folder.join(SURFACES);
-    std::fs::create_dir_all(&surfaces).map_err(|error| {
-        ImagingError::refused(format!("cannot be created: {error}"))
-            .at(surfaces.display().to_string())
-    })?;
-    for surface in &build.seen.made.surfaces {
-        let file = surface_file(&surface.name);
-        write_stl(&folder.join(&file), &surface.mesh)?;
-        files.push(file);
-    }
-    if wanted.labels {
-        write_label_nifti(&folder.join(LABELS_FILE), &build.seen.made.labels, cancel)?;
-        let names = build.seen.made.labels.names.iter();
-        let names = LabelNames {
-            schema_version: 1,
-            labels: names
-                .map(|(label, name)| LabelName {
-                    label: *label,
-                    name,
-                })
-                .collect(),
-        };
-        write_json(&folder.join(NAMES_FILE), &names)?;
-        files.extend([LABELS_FILE.to_owned(), NAMES_FILE.to_owned()]);
-    }
-    if wanted.volume {
-        write_nifti(&folder.join(VOLUME_FILE), &build.seen.volume, cancel)?;
-        files.push(VOLUME_FILE.to_owned());
-    }
-    write_json(&folder.join(REPORT_FILE), &BuildReport::of(build, wanted))?;
-    files.push(REPORT_FILE.to_owned());
-    Ok(files)
-}
-
-/// Writes a JSON document.
-pub(super) fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), ImagingError> {
-    let text = serde_json::to_string_pretty(value)
-        .map_err(|error| ImagingError::refused(error.to_string()).at(path.display().to_string()))?;
-    write_bytes(path, format!("{text}\n").as_bytes())
-}
-
-/// Writes a scenario with a line on where it comes from.
-///
-/// # Errors
-/// What cannot be written.
-pub(super) fn write_scenario(
-    path: &Path,
-    scenario: &Scenario,
-    first: &str,
-) -> Result<(), ImagingError> {
-    let text = scenario_text(scenario)
-        .map_err(|error| ImagingError::refused(error).at(path.display().to_string()))?;
-    write_bytes(path, format!("# {first}\n{text}").as_bytes())
-}
+/// Folder of images of slices there.
+pub(super) const SLICES: &str = "slices";
+/// Routes that were planned there.
+pub const ROUTES_FILE: &str = "routes.json";
+/// Decisions of the planning page's user there.
+pub const SESSION_FILE: &str = "session.toml";

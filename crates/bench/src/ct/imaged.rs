@@ -17,9 +17,10 @@ use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 use needlebench_synthesis::{Kernel, Noise, ScanPreset, Scanner, Streaks, synthesise_watched};
 
 use super::build::{BuildOptions, KnownMarkers, ScanBuild, SeenScan, register, see};
-use super::files::{BuildFiles, SCENARIO_FILE, write_build, write_json, write_scenario};
-use super::patient::{PatientFrame, Room, patient_scenario};
+use super::files::BuildFiles;
+use super::patient::{PatientFrame, Room};
 use super::touched::Draws;
+use super::written_folder::{SetAside, WrittenPatient, write_json, write_patient};
 use super::{CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan};
 use crate::Control;
 use crate::Stop;
@@ -34,6 +35,8 @@ pub struct Imaged {
     pub scenario: ResolvedScenario,
     /// That file.
     pub file: PathBuf,
+    /// What was made of a former build of the folder.
+    pub set_aside: Option<SetAside>,
 }
 
 /// The last scan that was made: of several cases that differ in what is done with it, it is made once.
@@ -100,7 +103,7 @@ pub fn imaged(
     resolved: &ResolvedScenario,
     folder: &Path,
     overrides: &Overrides,
-    files: BuildFiles,
+    files: &BuildFiles,
     last: Option<&mut LastScan>,
     control: &Control<'_>,
 ) -> Result<Imaged, Stop> {
@@ -143,7 +146,11 @@ pub fn imaged(
         "{}, as built from a synthetic scan of its phantom",
         resolved.scenario.name
     );
-    let path = write_patient(folder, &room, &build, goals, files, &first, control)?;
+    let WrittenPatient {
+        scenario: path,
+        set_aside,
+        ..
+    } = write_patient(folder, &room, &build, goals, files, &first, control)?;
     write_json(&folder.join("truth.json"), &scan.truth)
         .map_err(|error| Stop::of_scan(Path::new(file), error))?;
     let scenario = load_scenario(&path, overrides)?;
@@ -151,6 +158,7 @@ pub fn imaged(
         build,
         scenario,
         file: path,
+        set_aside,
     })
 }
 
@@ -180,10 +188,7 @@ pub fn scanned(
         &resolved,
         folder.path(),
         overrides,
-        BuildFiles {
-            labels: false,
-            volume: false,
-        },
+        &BuildFiles::default(),
         Some(last),
         &control,
     ) {
@@ -191,28 +196,6 @@ pub fn scanned(
         Err(Stop::Refused(findings)) => Err(findings),
         Err(Stop::Interrupted) => Err(one("interrupted".to_owned())),
     }
-}
-
-/// Writes what was built, and a scenario with it that can be run as it is; the scenario's path.
-///
-/// # Errors
-/// What cannot be written, or resolved; interrupted.
-pub fn write_patient(
-    folder: &Path,
-    room: &Room<'_>,
-    build: &ScanBuild,
-    goals: Vec<GoalSection>,
-    files: BuildFiles,
-    first: &str,
-    control: &Control<'_>,
-) -> Result<PathBuf, Stop> {
-    let path = folder.join(SCENARIO_FILE);
-    control.progress.message("writing");
-    write_build(folder, build, files, control.cancel)
-        .map_err(|error| Stop::of_scan(&path, error))?;
-    let scenario = patient_scenario(room, build, goals, folder);
-    write_scenario(&path, &scenario, first).map_err(|error| Stop::of_scan(&path, error))?;
-    Ok(path)
 }
 
 fn order(section: &CtSection, seed: u64, draws: &mut Draws) -> ScanOrder {

@@ -11,6 +11,7 @@ mod patient;
 mod scan_order;
 mod touched;
 mod truth;
+mod written_folder;
 
 /// The default room of a patient.
 pub const USUAL_ROOM: &str = include_str!("room.toml");
@@ -23,9 +24,10 @@ pub use build::{
 pub use built_folder::{
     BuildFacts, BuiltFolder, LesionFacts, MarkerFacts, SurfaceFacts, TargetFacts,
 };
-pub use files::{BuildFiles, BuildReport, SCENARIO_FILE, VOLUME_FILE};
-pub use imaged::{Imaged, LastScan, imaged, scanned, write_patient};
+pub use files::{BuildFiles, BuildReport, ROUTES_FILE, SCENARIO_FILE, SESSION_FILE, VOLUME_FILE};
+pub use imaged::{Imaged, LastScan, imaged, scanned};
 pub use patient::{PatientFrame, Room};
 pub use scan_order::{CtSubject, ScanOrder, ScanRange, SyntheticScan};
 pub use touched::marker_list;
 pub use truth::{LesionTruth, MarkerTruth, ScanTruth};
+pub use written_folder::{SetAside, WrittenPatient, write_patient};

@@ -9,8 +9,8 @@ use needlebench_kinematics::Pose;
 use needlebench_phantom::Tissue;
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::scenario::{
-    CovarianceMm2, CutSection, GoalSection, ImagingBlock, PartSection, PhantomSection,
-    RegistrationBlock, Scenario,
+    BuildSection, CovarianceMm2, CutSection, GoalSection, ImagingBlock, PartSection,
+    PhantomSection, RegistrationBlock, Scenario,
 };
 
 use super::ScanBuild;
@@ -32,13 +32,7 @@ pub struct PatientFrame {
 impl PatientFrame {
     /// Of what was built.
     pub fn of(build: &ScanBuild) -> Self {
-        let skin = build
-            .seen
-            .made
-            .surfaces
-            .iter()
-            .find(|each| each.tissue == SurfaceTissue::Skin);
-        let origin = skin.map_or_else(Vector3::zeros, |skin| {
+        let origin = build.seen.made.skin().map_or_else(Vector3::zeros, |skin| {
             let [low, high] = needlebench_geometry::mesh::extent_m(&skin.mesh);
             nalgebra::center(&low, &high).coords
         });
@@ -78,11 +72,13 @@ pub struct Room<'r> {
 }
 
 /// The scenario of a patient that was built: surfaces as parts, the robot where the registration puts it, measured
-/// covariances, and these goals. It is for a file in `folder`, with the surfaces in [`SURFACES`] beside it.
+/// covariances, and these goals. It is for a file in `folder`, with the surfaces in [`SURFACES`] and the report that
+/// `section` names beside it.
 pub(crate) fn patient_scenario(
     room: &Room<'_>,
     build: &ScanBuild,
     goals: Vec<GoalSection>,
+    section: BuildSection,
     folder: &Path,
 ) -> Scenario {
     let frame = PatientFrame::of(build);
@@ -92,6 +88,7 @@ pub(crate) fn patient_scenario(
     scenario.goals = goals;
     let own = scenario.phantom.take().unwrap_or_default();
     let mut phantom = phantom(own, room, build, &frame);
+    phantom.build = Some(section);
     if let Some(registered) = &build.registered {
         let reference_from_phantom =
             registered.registration.reference_from_ct * frame.ct_from_phantom();
@@ -217,10 +214,7 @@ fn phantom(
 
 /// Where the scan ends, as the patient has it.
 fn cuts(build: &ScanBuild, frame: &PatientFrame) -> Vec<CutSection> {
-    let surfaces = &build.seen.made.surfaces;
-    let skin = surfaces
-        .iter()
-        .find(|each| each.tissue == SurfaceTissue::Skin);
+    let skin = build.seen.made.skin();
     let cuts = skin.map_or_else(Vec::new, |skin| build.seen.field_of_view.cuts(&skin.mesh));
     let cuts = cuts.iter().map(|cut| {
         let offset_m = cut.offset_m - cut.normal.dot(&frame.origin_in_ct_m);

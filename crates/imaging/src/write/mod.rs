@@ -10,4 +10,4 @@ mod stl;
 pub use dicom::{DicomSeries, write_dicom};
 pub use file::{TEMPORARY_PREFIX, stream, write_bytes};
 pub use nifti::{write_label_nifti, write_nifti};
-pub use stl::write_stl;
+pub use stl::stl_bytes;

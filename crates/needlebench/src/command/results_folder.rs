@@ -71,18 +71,18 @@ fn lock(folder: &Path) -> Result<Option<File>, Failure> {
     })
 }
 
-/// Removes unfinished files, as far as possible.
+/// Removes unfinished files and folders, as far as possible.
 fn clear(folder: &Path, depth: u32) {
     for entry in folder.read_dir().into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
+        let is_unfinished = name.starts_with(TEMPORARY_PREFIX) && name.ends_with(".tmp");
         match entry.file_type() {
+            Ok(kind) if kind.is_dir() && is_unfinished => {
+                let _ = std::fs::remove_dir_all(entry.path());
+            }
             Ok(kind) if kind.is_dir() && depth < DEEPEST => clear(&entry.path(), depth + 1),
-            Ok(kind)
-                if kind.is_file()
-                    && name.starts_with(TEMPORARY_PREFIX)
-                    && name.ends_with(".tmp") =>
-            {
+            Ok(kind) if kind.is_file() && is_unfinished => {
                 let _ = std::fs::remove_file(entry.path());
             }
             _ => {}

@@ -227,13 +227,13 @@ fn scanned(
     };
     let files = BuildFiles {
         labels: true,
-        volume: false,
+        ..BuildFiles::default()
     };
     let made = imaged(
         scenario.scenario(),
         &folder,
         scan.overrides,
-        files,
+        &files,
         None,
         &control,
     );

@@ -12,6 +12,7 @@ use needlebench_bench::ct::{BuildFiles, VOLUME_FILE, imaged};
 use needlebench_bench::{Control, Stop};
 use needlebench_input::Finding;
 use needlebench_scenario::{Overrides, load_scenario};
+use needlebench_show::layout;
 use needlebench_viewer::{Case, Server, Stopper};
 use tempfile::NamedTempFile;
 
@@ -129,10 +130,18 @@ fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<Pat
     let files = BuildFiles {
         labels: true,
         volume: true,
+        ..BuildFiles::default()
     };
-    let made = imaged(&resolved, &folder, overrides, files, None, &control);
+    let made = imaged(&resolved, &folder, overrides, &files, None, &control);
     progress.finish();
-    made.map(|_| folder).map_err(stopped)
+    let made = made.map_err(stopped)?;
+    if let Some(set_aside) = &made.set_aside {
+        print_text(&layout::wrapped(&format!(
+            "note: {}",
+            set_aside.remark().message
+        )))?;
+    }
+    Ok(folder)
 }
 
 /// A page in the folder that redirects to an address, readable by its owner only: a command line would show the secret

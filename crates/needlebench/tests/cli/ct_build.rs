@@ -31,7 +31,7 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
     );
     let made = bench.run(format!("{arguments} --json"));
     let made = made.exits_with(0).json();
-    has_keys(&made, "schema_version ok folder scenario report");
+    has_keys(&made, "schema_version ok folder scenario report set_aside");
     let report = bench.read_json("patient/report.json");
     assert_eq!(made["report"], report);
     let truth = bench.read_json("ct/truth.json");
@@ -100,6 +100,70 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
             "needlebench check",
         ],
     );
+    nothing_outlives_its_build(&bench, &arguments);
+}
+
+/// Of a folder that is built once more, with markers elsewhere.
+fn nothing_outlives_its_build(bench: &Bench, arguments: &str) {
+    let plan = bench.text("patient/scenario.toml");
+    bench.write("patient/planned.toml", &plan);
+    bench.write("patient/room.toml", suite());
+    bench.write("patient/session.toml", "build_sha256 = \"5f\"");
+    bench.write("patient/routes.json", "{}");
+    // The same build once more leaves what was made of it.
+    let same = bench.run(format!("{arguments} --json")).json();
+    assert!(same["set_aside"].is_null(), "{}", same["set_aside"]);
+
+    let markers = bench.text("ct/marker_list.toml");
+    let moved = markers.replace("frame = \"base_link\"", "frame = \"base\"");
+    assert_ne!(markers, moved);
+    bench.write("moved.toml", moved);
+    let arguments = arguments.replace("ct/marker_list.toml", "moved.toml");
+    let made = bench
+        .run(format!("{arguments} --json"))
+        .exits_with(0)
+        .json();
+    let names: Vec<&str> = made["set_aside"]["names"]
+        .list()
+        .iter()
+        .map(|name| name.word())
+        .collect();
+    let derived = [
+        "planned.toml",
+        "routes.json",
+        "scenario.toml",
+        "session.toml",
+        "slices",
+    ];
+    assert_eq!(names, derived);
+    let former = format!("patient/{}", made["set_aside"]["folder"].word());
+    assert_eq!(bench.text(&format!("{former}/planned.toml")), plan);
+    assert!(bench.path("patient/room.toml").exists());
+
+    // The former plan is of no use, wherever it is.
+    bench.write("patient/planned.toml", &plan);
+    let check = |file: &str| bench.run(format!("check {file}")).exits_with(2).stderr;
+    let refused = check("patient/planned.toml");
+    holds(
+        &refused,
+        ["phantom.build.sha256", "another build", "plan again"],
+    );
+    let refused = check(&format!("{former}/planned.toml"));
+    holds(&refused, ["phantom.build.report", "moved aside"]);
+
+    // Nor are surfaces of another build, or what a build left that was interrupted.
+    let bone = bench.path("patient/surfaces/bone.stl");
+    let mut bytes = fs::read(&bone).unwrap();
+    bytes[0] += 1;
+    fs::write(&bone, bytes).unwrap();
+    let refused = check("patient/scenario.toml");
+    holds(
+        &refused,
+        ["bone.stl is not the surface", "build the folder again"],
+    );
+    fs::remove_file(bench.path("patient/report.json")).unwrap();
+    let refused = check("patient/scenario.toml");
+    holds(&refused, ["phantom.build.report", "interrupted"]);
 }
 
 #[test]

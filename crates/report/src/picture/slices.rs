@@ -96,13 +96,7 @@ struct Slice {
 /// A picture that cannot be encoded.
 pub fn slice_pictures(build: &ScanBuild) -> Result<Vec<SlicePicture>, PictureError> {
     let mut wanted = Vec::new();
-    let skin = build
-        .seen
-        .made
-        .surfaces
-        .iter()
-        .find(|each| each.tissue == SurfaceTissue::Skin);
-    if let Some(skin) = skin {
+    if let Some(skin) = build.seen.made.skin() {
         let [low, high] = needlebench_geometry::mesh::extent_m(&skin.mesh);
         for (number, share) in [0.25, 0.5, 0.75].into_iter().enumerate() {
             wanted.push(Slice {

@@ -72,7 +72,9 @@ pub use people::{
     ElbowPreference, Handedness, PeopleSection, PersonSection, Role, Side, StaturePercentile,
 };
 pub(crate) use phantom::NO_MODEL;
-pub use phantom::{CutSection, LengthUnit, PartSection, PartTissue, PhantomSection, Posture};
+pub use phantom::{
+    BuildSection, CutSection, LengthUnit, PartSection, PartTissue, PhantomSection, Posture,
+};
 pub use planning::{NeedleRouteSection, PlanningSection, RollAim};
 pub use ranking::RankingSection;
 pub use recording::RecordingSection;

@@ -70,6 +70,8 @@ pub struct PhantomSection {
     pub parts: Vec<PartSection>,
     /// Planes at which the scan ends that the parts are from.
     pub cuts: Vec<CutSection>,
+    /// The build that the patient is of; none where the parts are not from `ct build`.
+    pub build: Option<BuildSection>,
 }
 
 impl Default for PhantomSection {
@@ -90,8 +92,20 @@ impl Default for PhantomSection {
             head: false,
             parts: Vec::new(),
             cuts: Vec::new(),
+            build: None,
         }
     }
+}
+
+/// The build that a patient is of. What was made of one build, such as a plan, is rejected once the folder has another.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BuildSection {
+    /// The folder's `report.json`, relative to this file.
+    pub report: String,
+    /// SHA-256 of that report, lower-case hexadecimal.
+    #[schemars(length(max = 64))]
+    pub sha256: String,
 }
 
 /// A plane at which a scan ends. The surface beyond it is the cut through the body and no skin: nothing enters there, and

@@ -123,13 +123,14 @@ fn make(folder: &Path) {
     let files = BuildFiles {
         labels: true,
         volume: true,
+        ..BuildFiles::default()
     };
     write_patient(
         folder,
         &room,
         &built,
         vec![goal],
-        files,
+        &files,
         "Made by a test.",
         &control,
     )

@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_bench::ct::{
     BuildFiles, BuildOptions, BuildReport, GivenLabels, KnownMarkers, PatientFrame, Room,
-    ScanBuild, build, write_patient,
+    ScanBuild, SetAside, WrittenPatient, build, write_patient,
 };
 use needlebench_bench::{Control, Stop};
 use needlebench_imaging::markers::MarkerModel;
@@ -18,7 +18,6 @@ use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker, Registr
 use needlebench_imaging::{LesionSeed, SurfaceSizes};
 use needlebench_input::Finding;
 use needlebench_report::picture::{SlicePicture, slice_pictures};
-use needlebench_report::write_atomically;
 use needlebench_scenario::scenario::{GoalSection, Posture, Target};
 use needlebench_scenario::{
     MarkerFrame, MarkerList, Overrides, load_open_scenario, name_from_file, resolve_open_scenario,
@@ -160,16 +159,6 @@ fn named_place(text: &str) -> Result<NamedPlace, String> {
     })
 }
 
-impl BuildArguments {
-    /// Files besides surfaces, report and scenario.
-    fn files(&self) -> BuildFiles {
-        BuildFiles {
-            labels: !self.no_labels,
-            volume: !self.no_volume,
-        }
-    }
-}
-
 #[derive(Serialize)]
 struct BuildAnswer<'a> {
     schema_version: u32,
@@ -177,7 +166,9 @@ struct BuildAnswer<'a> {
     findings: Vec<Finding>,
     folder: String,
     scenario: Option<String>,
-    report: Option<BuildReport<'a>>,
+    report: Option<&'a BuildReport<'a>>,
+    /// What was made of a former build of the folder.
+    set_aside: Option<&'a SetAside>,
 }
 
 /// Builds a patient from a CT.
@@ -189,25 +180,8 @@ pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus, Failu
         cancel: &cancel,
         progress: &progress,
     };
-    let made = make(arguments, &control);
-    progress.finish();
-    match made {
-        Ok((built, file)) => {
-            if arguments.json {
-                print_json(&BuildAnswer {
-                    schema_version: 1,
-                    ok: true,
-                    findings: Vec::new(),
-                    folder: arguments.out.display().to_string(),
-                    scenario: Some(file.display().to_string()),
-                    report: Some(BuildReport::of(&built, arguments.files())),
-                })?;
-            } else {
-                let text = in_words(&built, arguments, &file)?;
-                print_text(&layout::wrapped(&text))?;
-            }
-            Ok(ExitStatus::Success)
-        }
+    match make(arguments, &control, &progress) {
+        Ok(()) => Ok(ExitStatus::Success),
         Err(Failure::BadInput(findings)) if arguments.json => {
             let answer = BuildAnswer {
                 schema_version: 1,
@@ -216,6 +190,7 @@ pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus, Failu
                 folder: arguments.out.display().to_string(),
                 scenario: None,
                 report: None,
+                set_aside: None,
             };
             Err(Failure::answered(status_of(&answer.findings), &answer))
         }
@@ -230,14 +205,36 @@ struct Given {
     room: OwnRoom,
 }
 
+/// Builds, writes and prints.
 fn make(
     arguments: &BuildArguments,
     control: &Control<'_>,
-) -> Result<(ScanBuild, PathBuf), Failure> {
+    progress: &TerminalProgress,
+) -> Result<(), Failure> {
     let stopped = |stop| Failure::of_stop(stop, "interrupted: no scenario.toml was written");
     let given = given(arguments).map_err(stopped)?;
     let _taken = ResultsFolder::take_private(&arguments.out)?;
-    make_of(arguments, given, control).map_err(stopped)
+    let built = built(arguments, &given, control)
+        .inspect_err(|_| progress.finish())
+        .map_err(stopped)?;
+    let written = write(arguments, &given.room, &built, control);
+    progress.finish();
+    let written = written.map_err(stopped)?;
+    if arguments.json {
+        print_json(&BuildAnswer {
+            schema_version: 1,
+            ok: true,
+            findings: Vec::new(),
+            folder: arguments.out.display().to_string(),
+            scenario: Some(written.scenario.display().to_string()),
+            report: Some(&written.report),
+            set_aside: written.set_aside.as_ref(),
+        })?;
+    } else {
+        let text = in_words(&built, arguments, &written)?;
+        print_text(&layout::wrapped(&text))?;
+    }
+    Ok(())
 }
 
 fn given(arguments: &BuildArguments) -> Result<Given, Stop> {
@@ -260,16 +257,11 @@ fn given(arguments: &BuildArguments) -> Result<Given, Stop> {
     })
 }
 
-fn make_of(
+fn built(
     arguments: &BuildArguments,
-    given: Given,
+    given: &Given,
     control: &Control<'_>,
-) -> Result<(ScanBuild, PathBuf), Stop> {
-    let Given {
-        markers,
-        names,
-        room,
-    } = given;
+) -> Result<ScanBuild, Stop> {
     control.progress.message("reading");
     let path = &arguments.path;
     let mut read = arguments
@@ -280,15 +272,14 @@ fn make_of(
         read.volume.slice_thickness_m = Some(1e-3 * thickness_mm);
     }
     let lesions = lesions(arguments, &read)?;
-    let goals_for: Vec<String> = lesions.iter().map(|seed| seed.name.clone()).collect();
-    check_entries(arguments, &goals_for)?;
+    check_entries(arguments, &lesions)?;
     let options = BuildOptions {
         lesions,
         labels: arguments.labels.clone().map(|file| GivenLabels {
             file,
-            names: names.unwrap_or_default(),
+            names: given.names.clone().unwrap_or_default(),
         }),
-        markers: markers.as_ref().map(known_markers),
+        markers: given.markers.as_ref().map(known_markers),
         sizes: SurfaceSizes {
             skin: arguments
                 .skin_triangles
@@ -297,28 +288,38 @@ fn make_of(
         },
         max_bytes: arguments.reading.max_bytes(),
     };
-    let built = build(read, &options, control).map_err(|error| Stop::of_scan(path, error))?;
+    build(read, &options, control).map_err(|error| Stop::of_scan(path, error))
+}
+
+fn write<'b>(
+    arguments: &BuildArguments,
+    room: &OwnRoom,
+    built: &'b ScanBuild,
+    control: &Control<'_>,
+) -> Result<WrittenPatient<'b>, Stop> {
+    let mut files = BuildFiles {
+        labels: !arguments.no_labels,
+        volume: !arguments.no_volume,
+        slices: Vec::new(),
+    };
     if arguments.pictures.are_wanted(arguments.json) {
         control.progress.message("images");
-        draw(&built, &arguments.out)?;
+        files.slices = slices(built, &arguments.out)?;
     }
-    let goals = goals(arguments, &built, &goals_for);
-    let first = "Built from a scan by `needlebench ct build`; details in report.json.";
     let room = Room {
         scenario: &room.scenario,
         resolved: &room.resolved,
         folder: &room.folder,
     };
-    let file = write_patient(
+    write_patient(
         &arguments.out,
         &room,
-        &built,
-        goals,
-        arguments.files(),
-        first,
+        built,
+        goals(arguments, built),
+        &files,
+        "Built from a scan by `needlebench ct build`; details in report.json.",
         control,
-    )?;
-    Ok((built, file))
+    )
 }
 
 /// The room, from its file or the default one.
@@ -393,11 +394,11 @@ fn lesions(arguments: &BuildArguments, read: &ReadVolume) -> Result<Vec<LesionSe
     Ok(all)
 }
 
-fn check_entries(arguments: &BuildArguments, lesions: &[String]) -> Result<(), Stop> {
+fn check_entries(arguments: &BuildArguments, lesions: &[LesionSeed]) -> Result<(), Stop> {
     let unknown = arguments
         .entries
         .iter()
-        .find(|entry| !lesions.contains(&entry.name));
+        .find(|entry| lesions.iter().all(|lesion| lesion.name != entry.name));
     match unknown {
         None => Ok(()),
         Some(entry) => Err(Finding::new(
@@ -445,11 +446,12 @@ fn known_markers(list: &MarkerList) -> KnownMarkers {
     }
 }
 
-fn goals(arguments: &BuildArguments, built: &ScanBuild, lesions: &[String]) -> Vec<GoalSection> {
+/// A goal for each lesion that has a surface.
+fn goals(arguments: &BuildArguments, built: &ScanBuild) -> Vec<GoalSection> {
     let frame = PatientFrame::of(built);
-    let seen = lesions
-        .iter()
-        .filter(|name| built.targets.iter().any(|target| target.name == **name));
+    let asked = arguments.lesions.iter().chain(&arguments.lesion_voxels);
+    let names = asked.map(|lesion| &lesion.name);
+    let seen = names.filter(|name| built.targets.iter().any(|target| target.name == **name));
     seen.map(|name| {
         let entry = arguments.entries.iter().find(|entry| entry.name == *name);
         let entry_mm =
@@ -463,30 +465,23 @@ fn goals(arguments: &BuildArguments, built: &ScanBuild, lesions: &[String]) -> V
     .collect()
 }
 
-/// Writes images of slices into their own folder.
-fn draw(built: &ScanBuild, out: &Path) -> Result<(), Stop> {
-    let folder = out.join("slices");
-    let failed = |path: &Path, error: &dyn std::fmt::Display| {
-        Stop::from(
-            Finding::new(
-                path.display().to_string(),
-                format!("cannot be written: {error}"),
-            )
-            .key("--out"),
-        )
-    };
-    std::fs::create_dir_all(&folder).map_err(|error| failed(&folder, &error))?;
-    let pictures = slice_pictures(built).map_err(|error| failed(&folder, &error))?;
-    for SlicePicture { name, png } in pictures {
-        let path = folder.join(name);
-        write_atomically(&path, &png).map_err(|error| failed(&path, &error))?;
-    }
-    Ok(())
+/// Images of slices: their names and bytes.
+fn slices(built: &ScanBuild, out: &Path) -> Result<Vec<(String, Vec<u8>)>, Stop> {
+    let pictures = slice_pictures(built).map_err(|error| {
+        let file = out.display().to_string();
+        Stop::from(Finding::new(file, format!("no images of slices: {error}")).key("--out"))
+    })?;
+    let each = |SlicePicture { name, png }| (name, png);
+    Ok(pictures.into_iter().map(each).collect())
 }
 
-fn in_words(built: &ScanBuild, arguments: &BuildArguments, file: &Path) -> Result<String> {
+fn in_words(
+    built: &ScanBuild,
+    arguments: &BuildArguments,
+    written: &WrittenPatient<'_>,
+) -> Result<String> {
     let mut text = String::new();
-    let report = BuildReport::of(built, arguments.files());
+    let report = &written.report;
     let out = &arguments.out;
     let [columns, rows, slices] = report.size;
     let [x, y, z] = report.spacing_m.map(|metres| metres * 1e3);
@@ -529,7 +524,8 @@ fn in_words(built: &ScanBuild, arguments: &BuildArguments, file: &Path) -> Resul
         write_registration(&mut text, built, &registered.registration)?;
     }
     text.push('\n');
-    for remark in &built.remarks {
+    let set_aside = written.set_aside.as_ref().map(SetAside::remark);
+    for remark in built.remarks.iter().chain(&set_aside) {
         match &remark.place {
             Some(place) => write!(text, "\nnote: {place}: {}", remark.message)?,
             None => write!(text, "\nnote: {}", remark.message)?,
@@ -551,7 +547,7 @@ fn in_words(built: &ScanBuild, arguments: &BuildArguments, file: &Path) -> Resul
         text,
         "\nresults: {}; next: needlebench check {}",
         shown(out),
-        shown(file)
+        shown(&written.scenario)
     )?;
     Ok(text)
 }

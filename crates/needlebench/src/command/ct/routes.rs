@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result};
 use clap::Args;
 use nalgebra::Vector3;
-use needlebench_bench::ct::{BuiltFolder, SCENARIO_FILE};
+use needlebench_bench::ct::{BuiltFolder, ROUTES_FILE, SCENARIO_FILE};
 use needlebench_bench::routes::{
     RoutePlan, RouteTask, SOLID_DIRECTIONS, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free,
     plan_routes, rank,
@@ -107,6 +107,8 @@ struct RoutesAnswer<'a> {
     ok: bool,
     findings: &'a [Finding],
     scenario: Option<&'a str>,
+    /// Of the `report.json` of the patient's folder.
+    build_sha256: Option<&'a str>,
     targets: &'a [RoutePlan],
     remarks: &'a [Remark],
     written: Option<String>,
@@ -114,6 +116,7 @@ struct RoutesAnswer<'a> {
 
 struct Found {
     name: String,
+    build_sha256: Option<String>,
     plans: Vec<RoutePlan>,
     remarks: Vec<Remark>,
     written: Option<PathBuf>,
@@ -126,6 +129,7 @@ impl Found {
             ok: self.is_served(),
             findings: &[],
             scenario: Some(&self.name),
+            build_sha256: self.build_sha256.as_deref(),
             targets: &self.plans,
             remarks: &self.remarks,
             written: self.written.as_deref().map(shown),
@@ -168,6 +172,7 @@ pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus, Failure>
                 ok: false,
                 findings: &findings,
                 scenario: None,
+                build_sha256: None,
                 targets: &[],
                 remarks: &[],
                 written: None,
@@ -200,7 +205,7 @@ fn written_files(arguments: &RoutesArguments, found: &Found) -> Result<Option<Pa
     };
     prepare_folder(&folder)?;
     let text = serde_json::to_string(&found.answer()).map_err(anyhow::Error::from)?;
-    let path = folder.join("routes.json");
+    let path = folder.join(ROUTES_FILE);
     write_atomically(&path, format!("{text}\n").as_bytes())
         .with_context(|| format!("cannot write {}", path.display()))?;
     if arguments.pictures.are_wanted(arguments.json) {
@@ -382,6 +387,10 @@ fn find(
     }
     let mut found = Found {
         name: patient.resolved.scenario.name.clone(),
+        build_sha256: patient
+            .built
+            .as_ref()
+            .map(|built| built.sha256().to_owned()),
         plans,
         remarks,
         written: None,

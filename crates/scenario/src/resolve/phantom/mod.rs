@@ -1,5 +1,6 @@
 //! The phantom of a scenario: a model, parts from meshes, or both, and where it lies.
 
+mod build;
 mod mesh_parts;
 mod place;
 
@@ -14,6 +15,7 @@ use needlebench_phantom::{PARAMETERS, Phantom, PhantomError, PhantomParameters, 
 
 use super::cache::Cache;
 use crate::scenario::{NO_MODEL, PhantomSection};
+use build::Report;
 use mesh_parts::with_mesh_parts;
 pub use place::PlacedPhantom;
 pub(super) use place::{off_the_table, place_phantom};
@@ -112,10 +114,18 @@ pub(super) fn scenario_phantom(
         let (phantom, source) = shipped_phantom(toml, section, base)?;
         (Some(phantom), Some(source))
     };
+    let report = section.build.as_ref();
+    let report = report.map(|build| Report::read(toml, build, base));
+    let report = report.transpose().map_err(one)?;
     let (phantom, parts) = match shipped {
         Some(phantom) if section.parts.is_empty() => (phantom, Vec::new()),
         shipped => with_mesh_parts(toml, &section.parts, shipped, base, &mut notes).map_err(one)?,
     };
+    if let Some(report) = &report {
+        report
+            .check_parts(toml, &section.parts, &parts, base)
+            .map_err(one)?;
+    }
     let phantom = cut_phantom(toml, section, phantom).map_err(one)?;
     let skin = phantom.skin();
     // A polyhedron is its own surface, whatever the fineness.
