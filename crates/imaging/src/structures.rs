@@ -29,12 +29,41 @@ pub struct Structure {
     pub tissue: SurfaceTissue,
 }
 
+/// Words, all of which a name has that is none of what the table would take it for: muscles named after bones, parts of
+/// the brain named like those of lung and heart, regions, and what is neither bone nor vessel.
+const OTHER: &[&[&str]] = &[
+    &["abdomen"],
+    &["assist"],
+    &["cartilage", "thyroid"],
+    &["extremities", "pelvis"],
+    &["fontanel"],
+    &["frontal", "lobe"],
+    &["hilum"],
+    &["insular", "lobe"],
+    &["joint"],
+    &["levator"],
+    &["ligament"],
+    &["limbic", "lobe"],
+    &["lymphatic"],
+    &["muscle"],
+    &["nerve"],
+    &["occipital", "lobe"],
+    &["parietal", "lobe"],
+    &["pelvis", "renal"],
+    &["sterno", "thyroid"],
+    &["temporal", "lobe"],
+];
+
 /// Words, all of which a name has; the structure that it is of; what that is. The first row that fits counts.
 const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
     (&["nodule"], "", SurfaceTissue::Lesion),
     (&["tumor"], "", SurfaceTissue::Lesion),
     (&["tumour"], "", SurfaceTissue::Lesion),
     (&["lesion"], "", SurfaceTissue::Lesion),
+    (&["cancer"], "", SurfaceTissue::Lesion),
+    (&["mass"], "", SurfaceTissue::Lesion),
+    (&["metastasis"], "", SurfaceTissue::Lesion),
+    (&["neoplasm"], "", SurfaceTissue::Lesion),
     (&["lung", "vessel"], "lung_vessels", SurfaceTissue::Vessel),
     (&["lung", "trachea"], "trachea", SurfaceTissue::Organ),
     (&["lung", "left"], "lung_left", SurfaceTissue::Lung),
@@ -66,18 +95,55 @@ const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
     ),
     (&["humerus", "left"], "humerus_left", SurfaceTissue::Bone),
     (&["humerus", "right"], "humerus_right", SurfaceTissue::Bone),
+    // Those of both sides in one.
+    (&["scapula"], "scapulae", SurfaceTissue::Bone),
+    (&["clavicula"], "clavicles", SurfaceTissue::Bone),
+    (&["clavicle"], "clavicles", SurfaceTissue::Bone),
+    (&["humerus"], "humeri", SurfaceTissue::Bone),
+    (&["skeleton"], "bone", SurfaceTissue::Bone),
+    (&["coccyx"], "sacrum", SurfaceTissue::Bone),
+    (&["ilium"], "hips", SurfaceTissue::Bone),
     (&["femur"], "femurs", SurfaceTissue::Bone),
     (&["hip", "implant"], "implants", SurfaceTissue::Bone),
     (&["hip"], "hips", SurfaceTissue::Bone),
     (&["pelvis"], "hips", SurfaceTissue::Bone),
     (&["skull"], "skull", SurfaceTissue::Bone),
     (&["mandible"], "skull", SurfaceTissue::Bone),
+    (&["maxilla"], "skull", SurfaceTissue::Bone),
+    (&["jawbone"], "skull", SurfaceTissue::Bone),
+    (&["zygoma"], "skull", SurfaceTissue::Bone),
+    (&["zygomatic", "arch"], "skull", SurfaceTissue::Bone),
+    (&["hyoid"], "hyoid", SurfaceTissue::Bone),
     (&["radius"], "forearms", SurfaceTissue::Bone),
     (&["ulna"], "forearms", SurfaceTissue::Bone),
     (&["carpal"], "hands", SurfaceTissue::Bone),
     (&["metacarpal"], "hands", SurfaceTissue::Bone),
+    (&["phalanges", "hand"], "hands", SurfaceTissue::Bone),
+    (&["patella"], "legs", SurfaceTissue::Bone),
+    (&["tibia"], "legs", SurfaceTissue::Bone),
+    (&["fibula"], "legs", SurfaceTissue::Bone),
+    (&["calcaneus"], "feet", SurfaceTissue::Bone),
+    (&["tarsal"], "feet", SurfaceTissue::Bone),
+    (&["metatarsal"], "feet", SurfaceTissue::Bone),
+    (&["phalanges", "feet"], "feet", SurfaceTissue::Bone),
     (&["bone"], "bone", SurfaceTissue::Bone),
+    (&["valve"], "heart", SurfaceTissue::Organ),
     (&["aorta"], "aorta", SurfaceTissue::Vessel),
+    (&["aortic"], "aorta", SurfaceTissue::Vessel),
+    (&["ivc"], "inferior_vena_cava", SurfaceTissue::Vessel),
+    (&["svc"], "superior_vena_cava", SurfaceTissue::Vessel),
+    (&["celiac", "trunk"], "celiac_trunk", SurfaceTissue::Vessel),
+    (&["truncus"], "arteries", SurfaceTissue::Vessel),
+    (&["thyrocervical"], "arteries", SurfaceTissue::Vessel),
+    (&["costocervical"], "arteries", SurfaceTissue::Vessel),
+    (&["ductus", "arteriosus"], "arteries", SurfaceTissue::Vessel),
+    (&["coronary", "sinus"], "veins", SurfaceTissue::Vessel),
+    (
+        &["pulmonary", "arterial"],
+        "pulmonary_arteries",
+        SurfaceTissue::Vessel,
+    ),
+    (&["arterial", "system"], "arteries", SurfaceTissue::Vessel),
     (
         &["pulmonary", "vein"],
         "pulmonary_veins",
@@ -128,7 +194,20 @@ const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
     (&["artery"], "arteries", SurfaceTissue::Vessel),
     (&["vein"], "veins", SurfaceTissue::Vessel),
     (&["vessel"], "vessels", SurfaceTissue::Vessel),
+    (&["venous", "system"], "veins", SurfaceTissue::Vessel),
+    // Cavities of the brain have the name of those of the heart.
+    (&["brain"], "brain", SurfaceTissue::Organ),
+    (&["ventricle", "third"], "brain", SurfaceTissue::Organ),
+    (&["ventricle", "fourth"], "brain", SurfaceTissue::Organ),
+    (&["ventricle", "lateral"], "brain", SurfaceTissue::Organ),
+    (&["ventricle", "horn"], "brain", SurfaceTissue::Organ),
+    (&["ventricle", "trigone"], "brain", SurfaceTissue::Organ),
+    (&["ventricle", "body"], "brain", SurfaceTissue::Organ),
     (&["heart"], "heart", SurfaceTissue::Organ),
+    (&["auricular"], "heart", SurfaceTissue::Organ),
+    (&["interatrial"], "heart", SurfaceTissue::Organ),
+    (&["interventricular"], "heart", SurfaceTissue::Organ),
+    (&["ventricular"], "heart", SurfaceTissue::Organ),
     (&["atrial"], "heart", SurfaceTissue::Organ),
     (&["atrium"], "heart", SurfaceTissue::Organ),
     (&["ventricle"], "heart", SurfaceTissue::Organ),
@@ -148,14 +227,22 @@ const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
     (&["pancreas"], "pancreas", SurfaceTissue::Organ),
     (&["kidney", "left"], "kidney_left", SurfaceTissue::Organ),
     (&["kidney", "right"], "kidney_right", SurfaceTissue::Organ),
+    (&["kidney"], "kidneys", SurfaceTissue::Organ),
     (&["adrenal"], "adrenal_glands", SurfaceTissue::Organ),
     (&["colon"], "colon", SurfaceTissue::Organ),
     (&["duodenum"], "duodenum", SurfaceTissue::Organ),
+    (&["rectum"], "colon", SurfaceTissue::Organ),
     (&["bowel"], "bowel", SurfaceTissue::Organ),
+    (&["intestine"], "bowel", SurfaceTissue::Organ),
+    (&["ileum"], "bowel", SurfaceTissue::Organ),
+    (&["jejunum"], "bowel", SurfaceTissue::Organ),
+    (&["thymus"], "thymus", SurfaceTissue::Organ),
+    (&["larynx"], "larynx", SurfaceTissue::Organ),
+    (&["prostate"], "prostate", SurfaceTissue::Organ),
+    (&["uterus"], "uterus", SurfaceTissue::Organ),
     (&["bladder"], "bladder", SurfaceTissue::Organ),
     (&["diaphragm"], "diaphragm", SurfaceTissue::Organ),
     (&["pericardium"], "heart", SurfaceTissue::Organ),
-    (&["brain"], "brain", SurfaceTissue::Organ),
 ];
 
 /// Words of which the name of the body's outside consists: `body_trunc`, `External`. One with another word is
@@ -192,7 +279,9 @@ const PLURALS: &[(&str, &str)] = &[
     ("lesions", "lesion"),
     ("lobes", "lobe"),
     ("lungs", "lung"),
+    ("masses", "mass"),
     ("metacarpals", "metacarpal"),
+    ("metastases", "metastasis"),
     ("nodules", "nodule"),
     ("ribs", "rib"),
     ("scapulae", "scapula"),
@@ -234,9 +323,11 @@ pub fn structure_of(name: &str) -> Option<Structure> {
             tissue: SurfaceTissue::Skin,
         });
     }
-    let (_, structure, tissue) = TABLE
-        .iter()
-        .find(|(wanted, _, _)| wanted.iter().all(|word| words.contains(word)))?;
+    let has = |wanted: &[&str]| wanted.iter().all(|word| words.contains(word));
+    if OTHER.iter().any(|wanted| has(wanted)) {
+        return None;
+    }
+    let (_, structure, tissue) = TABLE.iter().find(|(wanted, _, _)| has(wanted))?;
     let name = match *tissue {
         SurfaceTissue::Lesion => written
             .iter()

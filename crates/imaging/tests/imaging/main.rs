@@ -1,4 +1,5 @@
 //! CT volumes, from outside the crate.
 
+mod names;
 mod readers;
 mod reconstruct;

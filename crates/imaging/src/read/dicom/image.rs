@@ -11,6 +11,7 @@ use super::syntax::TransferSyntax;
 use super::tag::{self, Tag};
 use crate::ImagingError;
 use crate::read::scalar::{Kind, Rescale, Stored};
+use crate::structures::structure_of;
 
 /// Kinds of objects that are images of CT: of one slice, of many, and made of many.
 const CT_IMAGES: [&str; 3] = [
@@ -442,12 +443,28 @@ fn padding(data: &DataSet, is_signed: bool) -> Option<[f64; 2]> {
     Some([one.min(other), one.max(other)])
 }
 
+/// Its label; its coded type and side where the label has no known meaning and those have.
+fn segment_name(item: &DataSet, number: u16) -> String {
+    let meaning = |items: &[DataSet]| items.first()?.text(tag::CODE_MEANING);
+    let types = item.items(tag::SEGMENT_TYPE);
+    let modifiers = types.first().map(|each| each.items(tag::SEGMENT_TYPE_MODIFIER));
+    let side = modifiers.and_then(meaning);
+    let coded = meaning(types).map(|name| match side {
+        Some(side) => format!("{name} {side}"),
+        None => name,
+    });
+    let label = item.text(tag::SEGMENT_LABEL);
+    let mut names = label.iter().chain(&coded);
+    let known = names.find(|name| structure_of(name).is_some());
+    let name = known.or(label.as_ref()).or(coded.as_ref());
+    name.cloned().unwrap_or_else(|| format!("segment {number}"))
+}
+
 fn segmentation(data: &DataSet) -> Option<Segmentation> {
     let kind = data.text(tag::SEGMENTATION_TYPE)?;
     let segments = data.items(tag::SEGMENTS).iter().filter_map(|item| {
         let number = u16::try_from(item.integer(tag::SEGMENT_NUMBER)?).ok()?;
-        let label = item.text(tag::SEGMENT_LABEL);
-        Some((number, label.unwrap_or_else(|| format!("segment {number}"))))
+        Some((number, segment_name(item, number)))
     });
     Some(Segmentation {
         kind,

@@ -73,10 +73,16 @@ fn segmentation(kind: &str, positions: &[&str]) -> Vec<u8> {
         bytes
     };
     let short = |number: u16| number.to_le_bytes().to_vec();
-    let segment = |number: u16, label: &str| {
+    let segment = |number: u16, label: &str, meaning: &str, side: &str| {
+        let side = item(&[(0x0008_0104, *b"LO", side.as_bytes().to_vec())]);
+        let coded = item(&[
+            (0x0008_0104, *b"LO", meaning.as_bytes().to_vec()),
+            (0x0062_0011, *b"SQ", side),
+        ]);
         item(&[
             (0x0062_0004, *b"US", short(number)),
             (0x0062_0005, *b"LO", label.as_bytes().to_vec()),
+            (0x0062_000F, *b"SQ", coded),
         ])
     };
     let frames: Vec<u8> = (1..)
@@ -104,7 +110,11 @@ fn segmentation(kind: &str, positions: &[&str]) -> Vec<u8> {
         .with(
             0x0062_0002,
             *b"SQ",
-            [segment(1, "Lesion"), segment(2, "Lung")].concat(),
+            [
+                segment(1, "Lesion", "Mass", "Right"),
+                segment(2, "Segment_2", "Lung", "Left"),
+            ]
+            .concat(),
         )
         .with(0x5200_9230, *b"SQ", frames);
     if kind == "BINARY" {
@@ -142,7 +152,7 @@ fn a_binary_segmentation_is_placed_by_its_positions() {
         .filter(|(_, label)| *label > 0)
         .collect();
     assert_eq!(labelled, [(1, 2), (19, 2), (40, 1), (41, 1)]);
-    let names = [(1, "Lesion".to_owned()), (2, "Lung".to_owned())];
+    let names = [(1, "Lesion".to_owned()), (2, "Lung Left".to_owned())];
     assert_eq!(read.labels.names, names);
 }
 
