@@ -27,8 +27,9 @@ const BLUR_PIXELS: usize = 4;
 /// Share of an outline that is noise of air where it is a field of view and not the outline of a body.
 const IS_NOISE: f64 = 0.01;
 
-/// Share of a rim on the circle around it where a scanner cut it: the tips of an ellipse of 3 by 2 are on it with a fifth.
-const IS_ROUND: f64 = 0.25;
+/// Share of a rim on the circle around it where a scanner cut it: the tips of an ellipse of 3 by 2 are on it with a fifth,
+/// and with a third in pixels of a twentieth of it.
+const IS_ROUND: f64 = 0.5;
 
 /// Share of what is on that circle that is tissue where it was cut: skin that is blurred by half a pixel has half.
 const IS_CUT: f64 = 0.9;
@@ -344,7 +345,7 @@ mod tests {
     fn body_in_air_without_noise_that_a_circle_cuts_left_and_right_is_cut() {
         let scan = volume(|place, _| {
             let is_within = from_centre_mm(place) < RADIUS_MM;
-            let is_body = (30.0..140.0).contains(&place[1]);
+            let is_body = (20.0..160.0).contains(&place[1]);
             if is_within && is_body { 40 } else { AIR_HU }
         });
         let seen = FieldOfView::of(&scan);
@@ -368,6 +369,14 @@ mod tests {
             let [x, y] = [(x - CENTRE_MM[0]) / 90.0, (y - CENTRE_MM[1]) / 60.0];
             if x * x + y * y > 1.0 { AIR_HU } else { 40 }
         });
+        assert_eq!(FieldOfView::of(&scan).sides.len(), 4);
+        // In coarse pixels.
+        let mut scan = volume(|[x, y], _| {
+            let [x, y] = [(x - 120.0) / 36.0, (y - 100.0) / 24.0];
+            if x * x + y * y > 1.0 { AIR_HU } else { 40 }
+        });
+        let steps = nalgebra::Matrix3::from_diagonal(&Vector3::new(8e-3, 8e-3, 8e-3));
+        scan.grid = VoxelGrid::new(SIZE, steps, Point3::origin()).unwrap();
         assert_eq!(FieldOfView::of(&scan).sides.len(), 4);
         let scan = volume(|_, noise| AIR_HU + noise);
         assert_eq!(FieldOfView::of(&scan).sides.len(), 4);
