@@ -154,6 +154,26 @@ impl VoxelGrid {
         libm::atan2(normal.cross(&k).norm(), along)
     }
 
+    /// The voxel that an index is in; none outside the grid.
+    pub fn voxel_at(&self, index: &Point3<f64>) -> Option<[usize; 3]> {
+        let mut voxel = [0; 3];
+        for (axis, size) in self.size().into_iter().enumerate() {
+            let at = index[axis].round();
+            if !(0.0..size as f64).contains(&at) {
+                return None;
+            }
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "within the grid"
+            )]
+            {
+                voxel[axis] = at as usize;
+            }
+        }
+        Some(voxel)
+    }
+
     /// Offset of a voxel in the data: columns run fastest, slices slowest.
     pub fn offset(&self, [i, j, k]: [usize; 3]) -> usize {
         (k * self.size[1] + j) * self.size[0] + i

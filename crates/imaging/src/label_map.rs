@@ -197,6 +197,10 @@ pub(crate) fn complete(
         }
     }
 
+    // A thin wall may let the air of a lung out of what was found as the body.
+    let lungs = union_of(&|structure| structure.tissue == SurfaceTissue::Lung);
+    found.body.mask.unite_within(&body, &lungs);
+
     let mapped = union_of(&|structure| structure.tissue == SurfaceTissue::Bone);
     let not_bone = union_of(&|structure| {
         matches!(

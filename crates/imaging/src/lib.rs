@@ -47,7 +47,7 @@ pub use reconstruct::{
     LesionSize, MeasuredLesion, Progress, ReconstructOptions, Reconstruction, Surface,
     SurfaceSizes, reconstruct,
 };
-pub use resample::{Resampled, resample};
+pub use resample::{Resampled, resample, resample_labels};
 pub use segment::{
     Body, Bone, FIRST_LESION, Label, LabelFacts, Lesion, LesionSeed, Levels, Lung, Lungs,
     Segmentation, Side, label_map, segment,

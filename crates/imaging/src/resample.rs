@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{Point3, Vector3};
 
 use crate::in_slices::in_slices;
-use crate::{AIR_HU, ImagingError, NotAGrid, Orientation, Remark, Volume, VoxelGrid};
+use crate::{AIR_HU, ImagingError, LabelMap, NotAGrid, Orientation, Remark, Volume, VoxelGrid};
 
 /// Deviation of a step from an axis, as a share of it, up to which axes are only turned round or in another order:
 /// over a thousand voxels it comes to a hundredth of one.
@@ -80,6 +80,49 @@ pub fn resample(
         },
         remark,
     })
+}
+
+/// A label map on another grid: each voxel has the label of the one that it lies in, none outside them all.
+///
+/// The result is the same whatever the number of `threads`.
+pub fn resample_labels(
+    map: &LabelMap,
+    grid: &VoxelGrid,
+    threads: usize,
+    cancel: &AtomicBool,
+) -> Result<LabelMap, ImagingError> {
+    let mut labels = Vec::new();
+    labels
+        .try_reserve_exact(grid.len())
+        .map_err(|_| ImagingError::refused("not enough memory for the labels"))?;
+    labels.resize(grid.len(), 0_u16);
+    let [columns, rows, _] = grid.size();
+    let fill = |(): &mut (), k: usize, slice: &mut [u16]| {
+        for (j, row) in slice.chunks_mut(columns).enumerate() {
+            let (first, step) = along_row(&map.grid, grid, [j, k]);
+            for (i, label) in row.iter_mut().enumerate() {
+                if let Some(at) = map.grid.voxel_at(&(first + step * i as f64)) {
+                    *label = map.labels[map.grid.offset(at)];
+                }
+            }
+        }
+    };
+    in_slices(&mut labels, columns * rows, threads, cancel, || (), fill)?;
+    Ok(LabelMap {
+        grid: grid.clone(),
+        labels,
+        names: map.names.clone(),
+    })
+}
+
+/// Index in one grid of the first voxel of a row of another, and of the step to the next.
+fn along_row(of: &VoxelGrid, grid: &VoxelGrid, [j, k]: [usize; 2]) -> (Point3<f64>, Vector3<f64>) {
+    let index = |i: usize| {
+        let place = grid.ct_from_index(&Point3::new(i as f64, j as f64, k as f64));
+        of.index_from_ct(&place)
+    };
+    let first = index(0);
+    (first, index(1) - first)
 }
 
 /// Whether each step runs along an axis of `ct`, one way or the other.
@@ -157,13 +200,8 @@ fn interpolated(
     Ok(hu)
 }
 
-fn fill_row(volume: &Volume, grid: &VoxelGrid, [j, k]: [usize; 2], row: &mut [i16]) {
-    let index = |i: usize| {
-        let place = grid.ct_from_index(&Point3::new(i as f64, j as f64, k as f64));
-        volume.grid.index_from_ct(&place)
-    };
-    let first = index(0);
-    let step = index(1) - first;
+fn fill_row(volume: &Volume, grid: &VoxelGrid, at: [usize; 2], row: &mut [i16]) {
+    let (first, step) = along_row(&volume.grid, grid, at);
     for (i, out) in row.iter_mut().enumerate() {
         if let Some(hu) = trilinear(volume, &(first + step * i as f64)) {
             *out = hu;
@@ -278,6 +316,40 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn labels_of_leaning_slices_stay_where_they_are() {
+        let steps = Matrix3::new(5e-4, 0.0, 0.0, 0.0, 5e-4, 3e-4, 0.0, -1e-4, 1e-3);
+        let volume = volume(steps);
+        let labels = (0..volume.grid.len()).map(|at| u16::try_from(at).unwrap());
+        let map = LabelMap {
+            labels: labels.collect(),
+            grid: volume.grid.clone(),
+            names: vec![(3, "three".to_owned())],
+        };
+        let grid = resampled(&volume, 1).volume.grid;
+        let never = AtomicBool::new(false);
+        let made = resample_labels(&map, &grid, 2, &never).unwrap();
+        assert_eq!(made.names, map.names);
+        let [columns, rows, slices] = grid.size();
+        let mut inside = 0;
+        for k in 0..slices {
+            for (j, i) in (0..rows).flat_map(|j| (0..columns).map(move |i| (j, i))) {
+                let place = grid.ct_from_index(&Point3::new(i as f64, j as f64, k as f64));
+                let label = made.labels[grid.offset([i, j, k])];
+                // The nearest voxel along the axes of the map, by looking at them all.
+                let index = map.grid.index_from_ct(&place);
+                let within = (0..map.grid.len()).find(|at| {
+                    let at = [at % 6, at / 6 % 5, at / 30];
+                    (0..3).all(|axis| (index[axis] - at[axis] as f64).abs() < 0.5)
+                });
+                let wanted = within.map_or(0, |at| u16::try_from(at).unwrap());
+                inside += usize::from(within.is_some());
+                assert_eq!(label, wanted, "{i} {j} {k}");
+            }
+        }
+        assert!(inside > 60, "{inside}");
     }
 
     /// A field that is linear in place is interpolated without error but rounding.

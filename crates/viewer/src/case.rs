@@ -138,22 +138,7 @@ impl Case {
 
     /// Offset of the voxel that an index is in; none outside the volume.
     pub(crate) fn nearest_voxel(&self, index: &Point3<f64>) -> Option<usize> {
-        let size = self.grid().size();
-        let mut voxel = [0; 3];
-        for axis in 0..3 {
-            let at = index[axis].round();
-            if !(0.0..size[axis] as f64).contains(&at) {
-                return None;
-            }
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "within the volume"
-            )]
-            {
-                voxel[axis] = at as usize;
-            }
-        }
+        let voxel = self.grid().voxel_at(index)?;
         Some(self.grid().offset(voxel))
     }
 

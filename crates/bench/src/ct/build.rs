@@ -13,7 +13,8 @@ use needlebench_imaging::registration::{
 };
 use needlebench_imaging::{
     FieldOfView, ImagingError, LabelMap, LesionSeed, ReconstructOptions, Reconstruction, Remark,
-    Surface, SurfaceSizes, SurfaceTissue, Volume, reconstruct, resample, structure_of,
+    Surface, SurfaceSizes, SurfaceTissue, Volume, VoxelGrid, reconstruct, resample,
+    resample_labels, structure_of,
 };
 use needlebench_scenario::scenario::PartTissue;
 use serde::Serialize;
@@ -162,14 +163,26 @@ pub(super) fn see(
     let _stage = tracing::info_span!("see").entered();
     let mut remarks = read.remarks;
     let field_of_view = FieldOfView::of(&read.volume);
+    let of_file = read.volume.grid.clone();
     let resampled = resample(read.volume, options.max_bytes, threads, cancel)?;
     let is_interpolated = resampled.remark.is_some();
     tracing::info!(is_interpolated, "volume on a straight grid");
     remarks.extend(resampled.remark);
     let volume = resampled.volume;
     let labels = options.labels.as_ref();
-    let labels =
-        labels.map(|given| labels_of(given, &volume, options.max_bytes, control, &mut remarks));
+    let labels = labels.map(|given| {
+        let mut on =
+            |grid: &VoxelGrid| labels_of(given, grid, options.max_bytes, control, &mut remarks);
+        if !is_interpolated {
+            return on(&volume.grid);
+        }
+        // Other programs see the file's voxels; ours are in `volume.nii.gz`.
+        match on(&of_file) {
+            Ok(map) => resample_labels(&map, &volume.grid, threads, cancel),
+            Err(ImagingError::Interrupted) => Err(ImagingError::Interrupted),
+            Err(refused) => on(&volume.grid).map_err(|_| refused),
+        }
+    });
     let labels = labels.transpose()?;
     let markers = options.markers.as_ref().map(|known| {
         progress.message("markers");
@@ -274,7 +287,7 @@ pub(super) fn register(
 /// The label map, with its names.
 fn labels_of(
     given: &GivenLabels,
-    volume: &Volume,
+    grid: &VoxelGrid,
     max_bytes: u64,
     control: &Control<'_>,
     remarks: &mut Vec<Remark>,
@@ -284,7 +297,7 @@ fn labels_of(
         ..ReadOptions::default()
     };
     let place = given.file.display().to_string();
-    let read = read_labels(&given.file, &volume.grid, &options, control.cancel)
+    let read = read_labels(&given.file, grid, &options, control.cancel)
         .map_err(|error| error.at(place.clone()))?;
     remarks.extend(
         read.remarks
