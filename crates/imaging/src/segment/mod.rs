@@ -5,6 +5,7 @@ mod bone;
 mod labels;
 mod lesion;
 mod lungs;
+mod upright;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -109,6 +110,7 @@ pub fn segment(
     let body = body::find(&scan, seen, &mut remarks)?;
     let lungs = lungs::find(&scan, &body, &mut remarks)?;
     let bone = bone::find(&scan, &body, &lungs, &mut remarks)?;
+    upright::check(&scan, &body, &lungs, &bone)?;
     Ok(Segmentation {
         body,
         lungs,

@@ -560,6 +560,93 @@ fn label_map_from_elsewhere_stands_for_what_it_has() {
 
 /// A dense ball on the skin, of a millilitre at most, is a marker and no bone; the same ball under 8 mm of skin is bone.
 #[test]
+fn a_lung_of_the_label_map_is_in_the_body_where_its_air_leaks_out() {
+    // Through a wall of less than a voxel, as a pneumothorax with a drain has it.
+    let hole = Solid(
+        Box::new(|p| libm::hypot(p.y, p.z) < 12.0 && p.x > 100.0),
+        -1000.0,
+    );
+    let mut solids = chest();
+    solids.push(hole);
+    let volume = render(&solids, grid());
+    let mut options = ReconstructOptions::default();
+    let made = run(&volume, &options).unwrap();
+    let litres = |made: &Reconstruction| {
+        let skin = made
+            .surfaces
+            .iter()
+            .find(|each| each.tissue == SurfaceTissue::Skin);
+        1e3 * skin.unwrap().volume_m3
+    };
+    let leaking_l = litres(&made);
+    options.labels = Some(LabelMap {
+        labels: given_lungs(&volume),
+        grid: volume.grid.clone(),
+        names: vec![(1, "lung_left".to_owned()), (2, "lung_right".to_owned())],
+    });
+    let made = run(&volume, &options).unwrap();
+    let [x, y, z] = LUNG_AXES_MM;
+    let lung_l = 1e3 * ellipsoid_m3([x, y, z]);
+    let more_l = litres(&made) - leaking_l;
+    assert!((more_l / lung_l - 1.0).abs() < 0.1, "{more_l} {lung_l}");
+}
+
+/// Labels of the left and the right lung.
+fn given_lungs(volume: &Volume) -> Vec<u16> {
+    let solids = [left_lung(), right_lung()];
+    let [nx, ny, _] = volume.grid.size();
+    let label = |at: usize| {
+        let index = [at % nx, at / nx % ny, at / (nx * ny)].map(|each| each as f64);
+        let place = volume.grid.ct_from_index(&Point3::from(index)).coords / MM;
+        let lung = solids.iter().position(|solid| solid.0(&place));
+        lung.map_or(0, |lung| u16::try_from(lung + 1).unwrap())
+    };
+    (0..volume.hu.len()).map(label).collect()
+}
+
+/// With its rows or slices in the other order, as a file has it whose orientation is wrong.
+fn reversed(volume: &Volume, axis: usize) -> Volume {
+    let size = volume.grid.size();
+    let [nx, ny, _] = size;
+    let hu = (0..volume.hu.len()).map(|at| {
+        let mut voxel = [at % nx, at / nx % ny, at / (nx * ny)];
+        voxel[axis] = size[axis] - 1 - voxel[axis];
+        volume.hu[volume.grid.offset(voxel)]
+    });
+    Volume {
+        hu: hu.collect(),
+        ..volume.clone()
+    }
+}
+
+#[test]
+fn a_patient_who_is_upside_down_in_the_file_is_refused() {
+    let mut solids = chest();
+    // Sternum and trachea.
+    solids.push(Solid(
+        Box::new(|p| p.x.abs() < 15.0 && (-92.0..-84.0).contains(&p.y) && p.z.abs() < 60.0),
+        400.0,
+    ));
+    solids.push(Solid(
+        Box::new(|p| libm::hypot(p.x, p.y - 20.0) <= 8.0 && p.z > 20.0),
+        -1000.0,
+    ));
+    let volume = render(&solids, grid());
+    run(&volume, &ReconstructOptions::default()).unwrap();
+    let refused = |axis: usize| {
+        let error = run(&reversed(&volume, axis), &ReconstructOptions::default()).unwrap_err();
+        refusal(&error).1.to_owned()
+    };
+    let said = refused(1);
+    assert!(said.starts_with("the spine is in front"), "{said}");
+    let said = refused(2);
+    assert!(
+        said.starts_with("the trachea leaves the lungs at their lower end"),
+        "{said}"
+    );
+}
+
+#[test]
 fn what_lies_on_the_skin_is_no_bone() {
     let clear = run(&render(&chest(), grid()), &options()).unwrap();
     let bones = |made: &Reconstruction| {
