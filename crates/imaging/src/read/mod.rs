@@ -8,6 +8,7 @@ mod dicom;
 mod label_names;
 mod labels;
 mod nifti;
+mod patient_position;
 mod placing;
 mod plausibility;
 mod scalar;
@@ -25,6 +26,7 @@ use crate::{ImagingError, Orientation, Remark, Volume, VoxelGrid};
 
 pub use label_names::read_label_names;
 pub use labels::{ReadLabels, read_labels};
+pub use patient_position::{Lying, PatientPosition};
 
 /// How to read.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,6 +117,8 @@ pub struct Description {
     pub kernel: Option<String>,
     /// Peak voltage of the tube.
     pub tube_voltage_v: Option<f64>,
+    /// How the patient lay in the scanner.
+    pub patient_position: Option<PatientPosition>,
     /// Files that the voxels are from.
     pub files: usize,
     /// Voxels that the scanner did not see: air in the volume, and not to be counted in statistics.
@@ -175,7 +179,9 @@ fn format_of(path: &Path) -> Result<Format, ImagingError> {
         return Err(ImagingError::refused("the file is empty").hint("copy or export it again"));
     }
     // Bytes count before names: DICOM files are called .img, too.
-    if nifti::begins_as_header(&first) {
+    if dicom::has_mark(&first) {
+        Ok(Format::Dicom)
+    } else if nifti::begins_as_header(&first) {
         Ok(Format::Nifti)
     } else if dicom::is_dicom(&first) {
         Ok(Format::Dicom)

@@ -100,7 +100,100 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
             "needlebench check",
         ],
     );
+    a_room_that_is_not_the_markers_is_refused(&bench, &arguments);
+    bench.run(&arguments).exits_with(0);
     nothing_outlives_its_build(&bench, &arguments);
+}
+
+#[test]
+fn the_patient_lies_as_in_the_scan() {
+    let bench = Bench::with_scenario(PRONE);
+    let synth = "ct synth s.toml --out ct --format dicom --pixels 96 --preset thick --no-labels";
+    bench.run(synth).exits_with(0);
+    let said = bench.run("ct info ct/dicom").exits_with(0).stdout;
+    holds(&said, ["prone, head first (HFP)"]);
+    let built = |more: &str| {
+        bench.run(format!(
+            "ct build ct/dicom --out patient --no-pictures {more}"
+        ))
+    };
+    let said = built("").exits_with(0).stdout;
+    holds(
+        &said,
+        ["the patient lies prone as in the scan, not supine as in the room"],
+    );
+    holds(
+        &bench.text("patient/scenario.toml"),
+        ["posture = \"prone\""],
+    );
+    let said = built("--patient-position left-lateral")
+        .exits_with(0)
+        .stdout;
+    holds(
+        &said,
+        [
+            "--patient-position left-lateral is taken",
+            "prone, head first",
+        ],
+    );
+    holds(
+        &bench.text("patient/scenario.toml"),
+        ["posture = \"left-lateral\""],
+    );
+    // Towards a gantry at the other end of the table.
+    let room = PRONE.replace(
+        "[table]",
+        "[gantry]\nisocentre_mm = [-1200, 0, 900]\n\n[table]",
+    );
+    bench.write("room.toml", room);
+    let said = built("--room room.toml").exits_with(0).stdout;
+    holds(&said, ["the patient is turned, head_yaw_deg = 180"]);
+}
+
+const PRONE: &str = r#"
+name = "prone"
+
+[robot]
+urdf = "ur3"
+base_position_mm = [-280, 350, 1050]
+base_rpy_deg = [0, 0, 270]
+
+[tool]
+urdf = "perpendicular"
+
+[phantom]
+posture = "prone"
+
+[table]
+center_mm = [-300, 0]
+top_height_mm = 780
+
+[[goals]]
+lesion = "pleural_based"
+"#;
+
+/// What `check` would refuse is refused by the build that makes it, with its results kept.
+fn a_room_that_is_not_the_markers_is_refused(bench: &Bench, arguments: &str) {
+    let room = PRONE.replace("top_height_mm = 780", "top_height_mm = 380");
+    bench.write("low.toml", room);
+    let arguments = arguments.replace("--room s.toml", "--room low.toml");
+    let refused = bench.run(&arguments).exits_with(2);
+    holds(
+        &refused.stderr,
+        [
+            "above the table without support",
+            "table.top_height_mm",
+            "--room",
+        ],
+    );
+    holds(&refused.stdout, ["results: patient"]);
+    let answer = bench
+        .run(format!("{arguments} --json"))
+        .exits_with(2)
+        .json();
+    assert_eq!(answer["ok"], false);
+    assert_eq!(answer["findings"][0]["key"], "phantom.position_mm");
+    assert!(answer["report"]["surfaces"].list().len() > 3);
 }
 
 /// Of a folder that is built once more, with markers elsewhere.

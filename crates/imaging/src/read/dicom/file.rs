@@ -44,9 +44,14 @@ pub(in crate::read) fn is_dicom(first: &[u8]) -> bool {
     begin(first).is_some()
 }
 
+/// Whether the first bytes are a preamble and the mark of DICOM, whatever the preamble says: it may be that of a TIFF.
+pub(in crate::read) fn has_mark(first: &[u8]) -> bool {
+    first.get(PREAMBLE..PREAMBLE + MARK.len()) == Some(MARK)
+}
+
 /// Where the elements begin.
 fn begin(first: &[u8]) -> Option<usize> {
-    if first.get(PREAMBLE..PREAMBLE + MARK.len()) == Some(MARK) {
+    if has_mark(first) {
         return Some(PREAMBLE + MARK.len());
     }
     let head = first.get(..8)?;

@@ -10,6 +10,7 @@ use super::file::OpenedFile;
 use super::syntax::TransferSyntax;
 use super::tag::{self, Tag};
 use crate::ImagingError;
+use crate::read::PatientPosition;
 use crate::read::scalar::{Kind, Rescale, Stored};
 use crate::structures::structure_of;
 
@@ -107,9 +108,10 @@ pub(super) struct Slice {
     pub(super) rescale_type: Option<String>,
     pub(super) thickness_mm: Option<f64>,
     pub(super) tube_voltage_kv: Option<f64>,
+    pub(super) patient_position: Option<PatientPosition>,
     /// What may tell phases of one series: acquisition, temporal position, its index, trigger time, part of the
-    /// heart's cycle.
-    pub(super) phase: [Option<String>; 5],
+    /// heart's cycle, and times that all slices of a phase share.
+    pub(super) phase: [Option<String>; 8],
     /// Of a segmentation.
     pub(super) segment: Option<i64>,
 }
@@ -241,6 +243,9 @@ fn slice_of(file: &Arc<ImageFile>, frame: usize, layers: &Layers) -> Slice {
         rescale_type: layers.text(tag::RESCALE_TYPE).filter(|name| name != "HU"),
         thickness_mm: positive(layers, tag::SLICE_THICKNESS),
         tube_voltage_kv: positive(layers, tag::KVP),
+        patient_position: layers
+            .text(tag::PATIENT_POSITION)
+            .and_then(|term| PatientPosition::of_term(&term)),
         phase: [
             integer(tag::ACQUISITION_NUMBER).map(|number| number.to_string()),
             layers.text(tag::TEMPORAL_POSITION),
@@ -251,6 +256,9 @@ fn slice_of(file: &Arc<ImageFile>, frame: usize, layers: &Layers) -> Slice {
                 .ok()
                 .flatten()
                 .map(|percent| percent.to_string()),
+            layers.text(tag::ACQUISITION_DATE_TIME),
+            layers.text(tag::ACQUISITION_TIME),
+            layers.text(tag::CONTENT_TIME),
         ],
         segment: integer(tag::REFERENCED_SEGMENT),
     }
@@ -447,7 +455,9 @@ fn padding(data: &DataSet, is_signed: bool) -> Option<[f64; 2]> {
 fn segment_name(item: &DataSet, number: u16) -> String {
     let meaning = |items: &[DataSet]| items.first()?.text(tag::CODE_MEANING);
     let types = item.items(tag::SEGMENT_TYPE);
-    let modifiers = types.first().map(|each| each.items(tag::SEGMENT_TYPE_MODIFIER));
+    let modifiers = types
+        .first()
+        .map(|each| each.items(tag::SEGMENT_TYPE_MODIFIER));
     let side = modifiers.and_then(meaning);
     let coded = meaning(types).map(|name| match side {
         Some(side) => format!("{name} {side}"),

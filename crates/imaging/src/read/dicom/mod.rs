@@ -25,7 +25,7 @@ use super::placing::within_reason;
 use super::{Description, ReadOptions, ReadVolume, plausibility};
 use crate::{ImagingError, Remark, Volume};
 
-pub(super) use file::{FIRST_BYTES, is_dicom};
+pub(super) use file::{FIRST_BYTES, has_mark, is_dicom};
 pub(super) use segmentation::read as read_segmentation;
 
 /// Folders within folders, as exports have them: patient, study, series.
@@ -295,6 +295,7 @@ fn description(stack: &Stack, label: String, padding_voxels: u64) -> Description
         series: Some(label),
         kernel: first.key.kernel.clone(),
         tube_voltage_v: first.tube_voltage_kv.map(|kilovolts| kilovolts * 1e3),
+        patient_position: first.patient_position,
         files: files.len(),
         padding_voxels,
     }

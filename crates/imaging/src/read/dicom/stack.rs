@@ -3,6 +3,8 @@
 //! `SliceThickness`, `SpacingBetweenSlices`, `SliceLocation`, `InstanceNumber` and file names say nothing here: they are
 //! wrong too often.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::image::{Plane, Slice};
@@ -183,11 +185,19 @@ fn grid(plane: &Plane, step_mm: Vector3<f64>, size: [usize; 3]) -> Result<VoxelG
 }
 
 fn same_place(a: &Slice, b: &Slice, height_mm: f64) -> ImagingError {
+    if Arc::ptr_eq(&a.file, &b.file) {
+        return ImagingError::refused(format!(
+            "its {} frames have no position of their own",
+            a.file.frames
+        ))
+        .at(a.file.name.clone())
+        .hint("export it as one file for each slice, or as enhanced CT with a position for each frame");
+    }
     ImagingError::refused(format!(
         "two slices are at the same position, {height_mm:.3} mm along the slice normal"
     ))
     .at(format!("{}, {}", shown(a), shown(b)))
-    .hint("remove one of the two from the folder")
+    .hint("remove one of the two from the folder; phases of one series are told apart by acquisition or time")
 }
 
 /// A slice, for people.

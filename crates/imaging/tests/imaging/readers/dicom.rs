@@ -144,17 +144,34 @@ fn series_are_listed_and_never_mixed() {
 
 #[test]
 fn phases_of_one_series_are_told_apart() {
-    let phase = |name: &str| {
-        let instance = name.to_owned();
-        stack(3).into_iter().map(move |slice| Slice {
-            instance: format!("{}.{instance}", slice.instance),
-            ..slice.with(0x0020_0012, *b"IS", instance.as_str())
-        })
-    };
-    let slices: Vec<Slice> = phase("1").chain(phase("2")).collect();
-    let said = refusal(read_slices(&slices, &default()));
+    // By acquisition, or by the time that all slices of a phase share.
+    for (tag, vr, names) in [
+        (0x0020_0012, *b"IS", ["1", "2"]),
+        (0x0008_0032, *b"TM", ["100000.0", "100004.0"]),
+    ] {
+        let phase = |name: &str| {
+            let instance = name.to_owned();
+            stack(3).into_iter().map(move |slice| Slice {
+                instance: format!("{}.{instance}", slice.instance),
+                ..slice.with(tag, vr, instance.as_str())
+            })
+        };
+        let slices: Vec<Slice> = names.into_iter().flat_map(phase).collect();
+        let said = refusal(read_slices(&slices, &default()));
+        assert!(
+            said.contains("4.1: 3 slices") && said.contains("4.2: 3 slices"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn frames_without_positions_are_called_that() {
+    let mut slice = Slice::at(0.0).with(0x0028_0008, *b"IS", "3");
+    slice.pixels = slice.pixels.repeat(3);
+    let said = refusal(read_as("a.dcm", &slice.bytes()));
     assert!(
-        said.contains("4.1: 3 slices") && said.contains("4.2: 3 slices"),
+        said.contains("its 3 frames have no position of their own"),
         "{said}"
     );
 }
@@ -185,6 +202,10 @@ fn bytes_count_before_names() {
     for name in ["a.img", "a.nii", "a"] {
         assert_eq!(read_as(name, &whole).unwrap().volume, expected, "{name}");
     }
+    // A preamble may be anything, also the length of another format's header.
+    let mut other = whole.clone();
+    other[..4].copy_from_slice(&348_i32.to_le_bytes());
+    assert_eq!(read_as("a.dcm", &other).unwrap().volume, expected);
 }
 
 #[test]

@@ -8,8 +8,8 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_bench::ct::{
-    BuildFiles, BuildOptions, BuildReport, GivenLabels, KnownMarkers, PatientFrame, Room,
-    ScanBuild, SetAside, WrittenPatient, build, write_patient,
+    BuildFiles, BuildOptions, BuildReport, GivenLabels, KnownMarkers, PatientFrame, Registered,
+    Room, ScanBuild, SetAside, WrittenPatient, build, write_patient,
 };
 use needlebench_bench::{Control, Stop};
 use needlebench_imaging::markers::MarkerModel;
@@ -26,6 +26,7 @@ use needlebench_show::layout;
 use serde::Serialize;
 
 use super::info::ReadArguments;
+use super::position;
 use crate::arguments::{PicturesArguments, RobotArguments};
 use crate::command::results_folder::ResultsFolder;
 use crate::command::{overrides, print_json, print_text};
@@ -82,8 +83,8 @@ pub(crate) struct BuildArguments {
     /// Scenario for robot, tool, table, people and criteria [default: a UR3 beside a table].
     #[arg(long, value_name = "SCENARIO")]
     room: Option<PathBuf>,
-    /// Patient position [default: that of the room's scenario, or supine]; markers digitised with the robot override
-    /// it.
+    /// Patient position [default: that in the file, else that of the room's scenario, or supine]; markers digitised with
+    /// the robot override it.
     #[arg(
         long = "patient-position",
         alias = "posture",
@@ -203,6 +204,7 @@ struct Given {
     markers: Option<MarkerList>,
     names: Option<Vec<(u16, String)>>,
     room: OwnRoom,
+    overrides: Overrides,
 }
 
 /// Builds, writes and prints.
@@ -212,29 +214,65 @@ fn make(
     progress: &TerminalProgress,
 ) -> Result<(), Failure> {
     let stopped = |stop| Failure::of_stop(stop, "interrupted: no scenario.toml was written");
-    let given = given(arguments).map_err(stopped)?;
+    let mut given = given(arguments).map_err(stopped)?;
     let _taken = ResultsFolder::take_private(&arguments.out)?;
-    let built = built(arguments, &given, control)
+    let mut built = built(arguments, &given, control)
         .inspect_err(|_| progress.finish())
         .map_err(stopped)?;
+    position::lay(
+        arguments.posture.map(Posture::from),
+        &mut given.room,
+        &mut built,
+    );
     let written = write(arguments, &given.room, &built, control);
     progress.finish();
     let written = written.map_err(stopped)?;
+    let findings = refused(&written.scenario, &given, &built);
     if arguments.json {
-        print_json(&BuildAnswer {
+        let status = status_of(&findings);
+        let answer = BuildAnswer {
             schema_version: 1,
-            ok: true,
-            findings: Vec::new(),
+            ok: findings.is_empty(),
+            findings,
             folder: arguments.out.display().to_string(),
             scenario: Some(written.scenario.display().to_string()),
             report: Some(&written.report),
             set_aside: written.set_aside.as_ref(),
-        })?;
-    } else {
-        let text = in_words(&built, arguments, &written)?;
-        print_text(&layout::wrapped(&text))?;
+        };
+        if !answer.ok {
+            return Err(Failure::answered(status, &answer));
+        }
+        print_json(&answer)?;
+        return Ok(());
     }
-    Ok(())
+    let text = in_words(&built, arguments, &written, findings.is_empty())?;
+    print_text(&layout::wrapped(&text))?;
+    if findings.is_empty() {
+        Ok(())
+    } else {
+        Err(findings.into())
+    }
+}
+
+/// What `check` refuses of the scenario, with the options that mend it.
+fn refused(scenario: &Path, given: &Given, built: &ScanBuild) -> Vec<Finding> {
+    let Err(mut findings) = load_open_scenario(scenario, &given.overrides) else {
+        return Vec::new();
+    };
+    let is_registered =
+        |registered: &Registered| registered.registration.frame == ReferenceFrame::Robot;
+    if built.registered.as_ref().is_some_and(is_registered) {
+        for finding in &mut findings {
+            if finding.key.as_deref() == Some("phantom.position_mm") {
+                finding.hint = Some(
+                    "--markers place the patient, --room places table and fixtures: give `--room SCENARIO` this room's \
+                     `table.top_height_mm` and robot base, or no [table]"
+                        .to_owned(),
+                );
+            }
+        }
+    }
+    findings
 }
 
 fn given(arguments: &BuildArguments) -> Result<Given, Stop> {
@@ -254,6 +292,7 @@ fn given(arguments: &BuildArguments) -> Result<Given, Stop> {
         markers,
         names,
         room: room(arguments, &overrides)?,
+        overrides,
     })
 }
 
@@ -323,10 +362,10 @@ fn write<'b>(
 }
 
 /// The room, from its file or the default one.
-struct OwnRoom {
-    scenario: needlebench_scenario::scenario::Scenario,
-    resolved: needlebench_scenario::ResolvedScenario,
-    folder: PathBuf,
+pub(super) struct OwnRoom {
+    pub scenario: needlebench_scenario::scenario::Scenario,
+    pub resolved: needlebench_scenario::ResolvedScenario,
+    pub folder: PathBuf,
 }
 
 fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, Stop> {
@@ -342,11 +381,6 @@ fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, St
     let mut scenario = resolved.scenario.clone();
     if arguments.room.is_none() {
         scenario.name = name_from_file(&arguments.out);
-    }
-    if let (Some(posture), Some(phantom)) = (arguments.posture, &mut scenario.phantom) {
-        phantom.posture = posture.into();
-        phantom.body_roll_deg = 0.0;
-        phantom.head_up_deg = 0.0;
     }
     Ok(OwnRoom {
         scenario,
@@ -479,6 +513,7 @@ fn in_words(
     built: &ScanBuild,
     arguments: &BuildArguments,
     written: &WrittenPatient<'_>,
+    is_complete: bool,
 ) -> Result<String> {
     let mut text = String::new();
     let report = &written.report;
@@ -543,12 +578,11 @@ fn in_words(
             "\nnote: no lesion, so the scenario has no goals: add --lesion NAME=X,Y,Z, or write [[goals]]"
         )?;
     }
-    write!(
-        text,
-        "\nresults: {}; next: needlebench check {}",
-        shown(out),
-        shown(&written.scenario)
-    )?;
+    write!(text, "\nresults: {}", shown(out))?;
+    if is_complete {
+        let scenario = shown(&written.scenario);
+        write!(text, "; next: needlebench check {scenario}")?;
+    }
     Ok(text)
 }
 

@@ -242,6 +242,9 @@ fn in_words(path: &Path, volume: &VolumeAnswer, remarks: &[Remark]) -> Result<St
     line("extent", format!("{across:.1} x {down:.1} x {along:.1} mm"))?;
     line("thickness", thickness(volume))?;
     line("orientation", orientation(volume))?;
+    if let Some(position) = source.patient_position {
+        line("position", position.to_string())?;
+    }
     let [px, py, pz] = volume.first_voxel_m.map(|each| each * 1e3);
     line(
         "first voxel",

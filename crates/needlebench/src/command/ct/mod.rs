@@ -2,6 +2,7 @@
 
 mod build;
 mod info;
+mod position;
 mod routes;
 mod synth;
 
