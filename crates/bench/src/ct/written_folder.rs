@@ -13,7 +13,7 @@ use needlebench_scenario::scenario_text;
 use serde::{Deserialize, Serialize};
 
 use super::ScanBuild;
-use super::built_folder::read_facts;
+use super::built_folder::{BuildFacts, read_facts};
 use super::files::{
     BuildDigests, BuildFiles, BuildReport, LABELS_FILE, LabelNames, NAMES_FILE, REPORT_FILE,
     ROUTES_FILE, SCENARIO_FILE, SESSION_FILE, SLICES, VOLUME_FILE, surface_file,
@@ -187,7 +187,7 @@ fn replace(
     // From here to the end the folder has no report, and nothing reads it.
     remove(&path)?;
     let kept = |file: &str| report.surfaces.iter().any(|surface| surface.file == file);
-    let surfaces = surfaces.iter().flat_map(|facts| facts.surface_files());
+    let surfaces = surfaces.iter().flat_map(BuildFacts::surface_files);
     for file in surfaces.filter(|file| !kept(file)) {
         remove(&folder.join(file))?;
     }
@@ -279,7 +279,7 @@ fn is_derived(path: &Path, name: &str, sha256: &str) -> bool {
     if name == ROUTES_FILE || is_map {
         return true;
     }
-    if !Path::new(name).extension().is_some_and(|end| end == "toml") {
+    if Path::new(name).extension().is_none_or(|end| end != "toml") {
         return false;
     }
     let derived = read_text(path).ok();
@@ -291,15 +291,14 @@ fn is_derived(path: &Path, name: &str, sha256: &str) -> bool {
     if name == SESSION_FILE {
         return derived.build_sha256.as_deref() != Some(sha256);
     }
-    derived.phantom.is_some_and(|phantom| match phantom.build {
-        Some(build) => build.report == REPORT_FILE && build.sha256 != sha256,
-        // As builds were written that did not say which they are.
-        None => {
-            let inner = format!("{SURFACES}/");
-            phantom
-                .parts
-                .iter()
-                .any(|part| part.file.starts_with(&inner))
-        }
-    })
+    let Some(phantom) = derived.phantom else {
+        return false;
+    };
+    if let Some(build) = phantom.build {
+        return build.report == REPORT_FILE && build.sha256 != sha256;
+    }
+    // As builds were written that did not say which they are.
+    let inner = format!("{SURFACES}/");
+    let mut parts = phantom.parts.iter();
+    parts.any(|part| part.file.starts_with(&inner))
 }
