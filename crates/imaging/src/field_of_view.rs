@@ -27,9 +27,12 @@ const BLUR_PIXELS: usize = 4;
 /// Share of an outline that is noise of air where it is a field of view and not the outline of a body.
 const IS_NOISE: f64 = 0.01;
 
-/// Share of a rim on the circle around it where a scanner cut it: the tips of an ellipse of 3 by 2 are on it with a fifth,
-/// and with a third in pixels of a twentieth of it.
-const IS_ROUND: f64 = 0.5;
+/// Share of a rim on the circle around it where a scanner cut it, in fine pixels and in others: the tips of an ellipse of
+/// 3 by 2 are on it with a fifth, and with a third in pixels of a twentieth of its length.
+const IS_ROUND: [f64; 2] = [0.35, 0.5];
+
+/// Pixels are fine where the circle's radius has so many.
+const FINE: f64 = 60.0;
 
 /// Share of what is on that circle that is tissue where it was cut: skin that is blurred by half a pixel has half.
 const IS_CUT: f64 = 0.9;
@@ -260,7 +263,13 @@ impl Outline {
                 cut += usize::from(self.is_dense[j * self.size[0] + i]);
             }
         }
-        f64::from(on_circle) >= IS_ROUND * rim.len() as f64
+        let [fine, coarse] = IS_ROUND;
+        let is_round = if radius >= FINE * x.max(y) {
+            fine
+        } else {
+            coarse
+        };
+        f64::from(on_circle) >= is_round * rim.len() as f64
             && cut as f64 >= IS_CUT * f64::from(on_circle)
     }
 

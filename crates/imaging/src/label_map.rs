@@ -199,7 +199,21 @@ pub(crate) fn complete(
 
     // A thin wall may let the air of a lung out of what was found as the body.
     let lungs = union_of(&|structure| structure.tissue == SurfaceTissue::Lung);
-    found.body.mask.unite_within(&body, &lungs);
+    let mut whole = found.body.mask.cropped(&body);
+    let known = whole.clone();
+    whole.unite(&lungs);
+    if whole.count() > known.count() {
+        // Not what the map calls a lung on the couch.
+        let parts = Components::of(&whole, Connectivity::Faces);
+        let mut has_body = vec![false; parts.parts().len()];
+        for (part, [from, to], j, k) in parts.runs() {
+            has_body[part] = has_body[part] || (from..to).any(|i| known.get([i, j, k]));
+        }
+        found
+            .body
+            .mask
+            .unite_within(&body, &parts.mask_of(|part| has_body[part]));
+    }
 
     let mapped = union_of(&|structure| structure.tissue == SurfaceTissue::Bone);
     let not_bone = union_of(&|structure| {

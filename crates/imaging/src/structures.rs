@@ -40,10 +40,12 @@ const OTHER: &[&[&str]] = &[
     &["frontal", "lobe"],
     &["hilum"],
     &["insular", "lobe"],
+    &["ileocecal"],
     &["joint"],
     &["levator"],
     &["ligament"],
     &["limbic", "lobe"],
+    &["lymph"],
     &["lymphatic"],
     &["muscle"],
     &["nerve"],
@@ -304,7 +306,7 @@ pub fn structure_of(name: &str) -> Option<Structure> {
         .split(|c: char| !c.is_alphabetic())
         .filter(|word| !word.is_empty())
         .collect();
-    let words: Vec<&str> = written
+    let mut words: Vec<&str> = written
         .iter()
         .map(|&word| match word {
             "l" => "left",
@@ -315,6 +317,11 @@ pub fn structure_of(name: &str) -> Option<Structure> {
                 .map_or(word, |(_, one)| one),
         })
         .collect();
+    // Both sides in one are neither.
+    let sides = ["left", "right"];
+    if sides.iter().all(|side| words.contains(side)) {
+        words.retain(|word| !sides.contains(word));
+    }
     if words.iter().any(|word| IS_OUTSIDE.contains(word))
         && words.iter().all(|word| OUTSIDE.contains(word))
     {
@@ -324,10 +331,11 @@ pub fn structure_of(name: &str) -> Option<Structure> {
         });
     }
     let has = |wanted: &[&str]| wanted.iter().all(|word| words.contains(word));
-    if OTHER.iter().any(|wanted| has(wanted)) {
+    let (_, structure, tissue) = TABLE.iter().find(|(wanted, _, _)| has(wanted))?;
+    // A lesion may be called after any place.
+    if *tissue != SurfaceTissue::Lesion && OTHER.iter().any(|wanted| has(wanted)) {
         return None;
     }
-    let (_, structure, tissue) = TABLE.iter().find(|(wanted, _, _)| has(wanted))?;
     let name = match *tissue {
         SurfaceTissue::Lesion => written
             .iter()
@@ -396,6 +404,13 @@ mod tests {
             ("lung vessels", "lung_vessels", SurfaceTissue::Vessel),
             ("urinary_bladder", "bladder", SurfaceTissue::Organ),
             ("femur_left", "femurs", SurfaceTissue::Bone),
+            ("Kidney Right and left", "kidneys", SurfaceTissue::Organ),
+            ("Scapula Right and left", "scapulae", SurfaceTissue::Bone),
+            (
+                "nodule left hilum",
+                "nodule_left_hilum",
+                SurfaceTissue::Lesion,
+            ),
         ] {
             let structure = structure_of(name);
             let found = structure.map(|found| (found.name, found.tissue));
@@ -407,6 +422,9 @@ mod tests {
             "air",
             "face",
             "external oblique",
+            "Lung Right and left",
+            "para-aortic lymph nodes",
+            "ileocecal valve",
             "lung",
         ] {
             assert_eq!(structure_of(name), None, "{name}");

@@ -167,6 +167,8 @@ pub fn planned(
             "the folder may have been moved or deleted since the page was opened".to_owned(),
         ),
     })?;
+    // The needle is of the scan that the page shows.
+    case.built().check_unchanged()?;
     let mut edit = ScenarioEdit::new(&file, &text)?;
     edit_goal(&mut edit, case, &needle.section, configuration, remark)?;
     let is_open = |goal: &GoalSection| {

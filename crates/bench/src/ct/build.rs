@@ -180,7 +180,10 @@ pub(super) fn see(
         match on(&of_file) {
             Ok(map) => resample_labels(&map, &volume.grid, threads, cancel),
             Err(ImagingError::Interrupted) => Err(ImagingError::Interrupted),
-            Err(refused) => on(&volume.grid).map_err(|_| refused),
+            Err(refused) => on(&volume.grid).map_err(|error| match error {
+                ImagingError::Interrupted => error,
+                ImagingError::Refused { .. } => refused,
+            }),
         }
     });
     let labels = labels.transpose()?;

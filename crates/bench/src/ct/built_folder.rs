@@ -173,6 +173,21 @@ impl BuiltFolder {
         &self.facts.sha256
     }
 
+    /// Whether the folder still has the build that was read.
+    ///
+    /// # Errors
+    /// It was built again since.
+    pub fn check_unchanged(&self) -> Result<(), Finding> {
+        let path = self.folder.join(REPORT_FILE);
+        let text = read_text(&path).ok();
+        if text.is_some_and(|text| sha256_hex(text.as_bytes()) == self.facts.sha256) {
+            return Ok(());
+        }
+        let message = "the folder was built again since it was read";
+        Err(Finding::new(path.display().to_string(), message)
+            .hint("start the planning page again, and choose target and entry anew"))
+    }
+
     /// What each voxel is. Its grid is the report's, to the last digit, not that of a file of single precision.
     pub fn labels(&self) -> &LabelMap {
         &self.labels
@@ -255,6 +270,10 @@ impl BuiltFolder {
             let finding = Finding::new(file, message);
             Stop::from(finding.key("phantom.parts").hint(BUILD_ANEW))
         };
+        let build = scenario.phantom.as_ref().and_then(|it| it.build.as_ref());
+        if build.is_some_and(|build| build.sha256 != self.facts.sha256) {
+            return Err(other(format!("not of the build of {REPORT_FILE}")));
+        }
         let parts = scenario.phantom.as_ref().map(|it| &it.parts[..]);
         for surface in &self.facts.surfaces {
             let mut parts = parts.unwrap_or_default().iter();

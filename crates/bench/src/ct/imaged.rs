@@ -146,13 +146,20 @@ pub fn imaged(
         "{}, as built from a synthetic scan of its phantom",
         resolved.scenario.name
     );
+    let truth = folder.join("truth.json");
+    if truth.exists() {
+        // That of another scan is no truth of this one.
+        std::fs::remove_file(&truth).map_err(|error| {
+            let refused = ImagingError::refused(format!("cannot be replaced: {error}"));
+            Stop::of_scan(&truth, refused)
+        })?;
+    }
     let WrittenPatient {
         scenario: path,
         set_aside,
         ..
     } = write_patient(folder, &room, &build, goals, files, &first, control)?;
-    write_json(&folder.join("truth.json"), &scan.truth)
-        .map_err(|error| Stop::of_scan(Path::new(file), error))?;
+    write_json(&truth, &scan.truth).map_err(|error| Stop::of_scan(Path::new(file), error))?;
     let scenario = load_scenario(&path, overrides)?;
     Ok(Imaged {
         build,

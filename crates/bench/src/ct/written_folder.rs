@@ -45,7 +45,7 @@ impl SetAside {
     /// What is said of it.
     pub fn remark(&self) -> Remark {
         Remark::new(format!(
-            "made of a former build, moved to {}/: {}",
+            "of a former build, moved to {}/ and of no use to other commands: {}",
             self.folder,
             self.names.join(", ")
         ))
@@ -55,8 +55,8 @@ impl SetAside {
 /// Writes what was built, and a scenario with it that can be run as it is.
 ///
 /// All of it is written into a folder of its own first: a build that is interrupted leaves the former one as it was, or,
-/// while files are renamed, a folder without a report, which is rejected by all that read it. Plans, sessions and the
-/// like of a former build are moved into a folder `former-...`.
+/// while files are renamed, a folder without a report, which is rejected by all that read it. Report, plans, sessions and
+/// the like of a former build are moved into a folder `former-...`, and a scenario with another text, too.
 ///
 /// # Errors
 /// What cannot be written; interrupted.
@@ -179,16 +179,32 @@ fn replace(
     let former = read_text(&path).ok();
     let former = former.map(|text| sha256_hex(text.as_bytes()));
     let surfaces = read_facts(&path).ok();
-    let set_aside = if former.as_deref() == Some(sha256) {
-        None
-    } else {
-        set_aside(folder, former.as_deref(), sha256)?
-    };
-    // From here to the end the folder has no report, and nothing reads it.
+    let is_edited = read_text(&folder.join(SCENARIO_FILE))
+        .is_ok_and(|text| read_text(&aside.join(SCENARIO_FILE)).ok() != Some(text));
+    let is_same = former.as_deref() == Some(sha256);
+    // A build that was interrupted while its files were renamed has a scenario that names its report.
+    let was_built = surfaces.is_some() || is_of_build(&folder.join(SCENARIO_FILE));
+    let mut names = Vec::new();
+    if was_built && !is_same {
+        // First: from here to the end the folder has no report, and nothing reads it.
+        names.extend(path.exists().then(|| REPORT_FILE.to_owned()));
+        names.extend(derived(folder, sha256)?);
+    }
+    if is_edited && !names.iter().any(|name| name == SCENARIO_FILE) {
+        names.push(SCENARIO_FILE.to_owned());
+    }
+    let set_aside = set_aside(folder, former.as_deref(), names)?;
     remove(&path)?;
     let kept = |file: &str| report.surfaces.iter().any(|surface| surface.file == file);
     let surfaces = surfaces.iter().flat_map(BuildFacts::surface_files);
-    for file in surfaces.filter(|file| !kept(file)) {
+    // What the report of a stranger names is not removed.
+    let is_ours = |file: &&str| {
+        let name = file
+            .strip_prefix(SURFACES)
+            .and_then(|rest| rest.strip_prefix('/'));
+        name.is_some_and(|name| !name.starts_with('.') && !name.contains(['/', '\\']))
+    };
+    for file in surfaces.filter(is_ours).filter(|file| !kept(file)) {
         remove(&folder.join(file))?;
     }
     for file in [LABELS_FILE, NAMES_FILE, VOLUME_FILE] {
@@ -215,8 +231,8 @@ fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Moves what was made of a former build into a folder of its own.
-fn set_aside(folder: &Path, former: Option<&str>, sha256: &str) -> io::Result<Option<SetAside>> {
+/// Names of what was made of another build than this, in order.
+fn derived(folder: &Path, sha256: &str) -> io::Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in folder.read_dir()? {
         let entry = entry?;
@@ -227,10 +243,19 @@ fn set_aside(folder: &Path, former: Option<&str>, sha256: &str) -> io::Result<Op
             names.push(name);
         }
     }
+    names.sort();
+    Ok(names)
+}
+
+/// Moves these files and folders into a folder of their own, in this order.
+fn set_aside(
+    folder: &Path,
+    former: Option<&str>,
+    names: Vec<String>,
+) -> io::Result<Option<SetAside>> {
     if names.is_empty() {
         return Ok(None);
     }
-    names.sort();
     let stem = format!(
         "former-{}",
         former.map_or("unfinished", |sha256| &sha256[..8])
@@ -271,7 +296,7 @@ struct DerivedPart {
 /// Whether a file of the folder was made of another build than this.
 fn is_derived(path: &Path, name: &str, sha256: &str) -> bool {
     if path.is_dir() {
-        return name == SLICES;
+        return name == SLICES && has_images_alone(path);
     }
     let is_map = [".routes.png", ".routes.svg"]
         .iter()
@@ -282,9 +307,7 @@ fn is_derived(path: &Path, name: &str, sha256: &str) -> bool {
     if Path::new(name).extension().is_none_or(|end| end != "toml") {
         return false;
     }
-    let derived = read_text(path).ok();
-    let derived = derived.and_then(|text| from_toml::<Derived>(name, &text).ok());
-    let Some(derived) = derived else {
+    let Some(derived) = read_derived(path) else {
         // A session that cannot be read is none of this build.
         return name == SESSION_FILE;
     };
@@ -301,4 +324,23 @@ fn is_derived(path: &Path, name: &str, sha256: &str) -> bool {
     let inner = format!("{SURFACES}/");
     let mut parts = phantom.parts.iter();
     parts.any(|part| part.file.starts_with(&inner))
+}
+
+fn read_derived(path: &Path) -> Option<Derived> {
+    let text = read_text(path).ok()?;
+    from_toml(&path.display().to_string(), &text).ok()
+}
+
+/// Whether a scenario names the report of its build.
+fn is_of_build(path: &Path) -> bool {
+    let phantom = read_derived(path).and_then(|derived| derived.phantom);
+    phantom.is_some_and(|phantom| phantom.build.is_some())
+}
+
+/// Whether a folder has the images of slices that builds draw, and nothing else.
+fn has_images_alone(folder: &Path) -> bool {
+    let is_image = |entry: io::Result<std::fs::DirEntry>| {
+        entry.is_ok_and(|entry| entry.path().extension().is_some_and(|end| end == "png"))
+    };
+    folder.read_dir().is_ok_and(|mut all| all.all(is_image))
 }

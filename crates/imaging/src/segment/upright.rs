@@ -18,8 +18,8 @@ const SPINE_L: f64 = 0.06;
 /// The sternum has less than this share of the spine's bone.
 const STERNUM: f64 = 0.25;
 
-/// The trachea: it is so long between the lungs at least, m,
-const TRACHEA_M: f64 = 0.04;
+/// The trachea: it leads so far between the lungs, as a share of their height (a carina is at a third of it),
+const TRACHEA_INSIDE: f64 = 0.25;
 
 /// ends so near to where they end, or beyond, m,
 const TRACHEA_END_M: f64 = 0.02;
@@ -40,6 +40,10 @@ pub(super) fn check(
     bone: &Bone,
 ) -> Result<(), ImagingError> {
     let steps = scan.volume.grid.steps_m();
+    if steps[(1, 1)] == 0.0 || steps[(2, 2)] == 0.0 {
+        // Axes in another order than the patient's.
+        return Ok(());
+    }
     let hint = "orientation or positions in the file are wrong: export the scan again, as DICOM if possible";
     let is_cut = ["anterior", "posterior"]
         .iter()
@@ -87,6 +91,7 @@ fn trachea_at_ends(scan: &Scan<'_>, lungs: &Lungs) -> [bool; 2] {
     };
     let both = a.joined(&b);
     let [x_m, _, z_m] = scan.spacing_m;
+    let height = (both.last[2] - both.first[2] + 1) as f64;
     let middle_of = |bounds: &IndexBox| 0.5 * (bounds.first[0] + bounds.last[0]) as f64;
     let middle = 0.5 * (middle_of(&a) + middle_of(&b));
     let parts = Components::of(&lungs.airways, Connectivity::Faces);
@@ -96,7 +101,7 @@ fn trachea_at_ends(scan: &Scan<'_>, lungs: &Lungs) -> [bool; 2] {
         let inside = (last.min(both.last[2]) + 1).saturating_sub(first.max(both.first[2]));
         let section_m2 = part.voxels as f64 * scan.voxel_m3() / ((last - first + 1) as f64 * z_m);
         let aside_m = (part.centroid()[0] - middle).abs() * x_m;
-        if (inside as f64) * z_m < TRACHEA_M
+        if (inside as f64) < TRACHEA_INSIDE * height
             || section_m2 > TRACHEA_SECTION_M2
             || aside_m > TRACHEA_ASIDE_M
         {

@@ -81,7 +81,15 @@ fn clear(folder: &Path, depth: u32) {
             Ok(kind) if kind.is_dir() && is_unfinished => {
                 let _ = std::fs::remove_dir_all(entry.path());
             }
-            Ok(kind) if kind.is_dir() && depth < DEEPEST => clear(&entry.path(), depth + 1),
+            Ok(kind) if kind.is_dir() && depth < DEEPEST => {
+                // Another process may be writing there.
+                let inner = File::open(entry.path());
+                let is_taken = inner
+                    .is_ok_and(|inner| matches!(inner.try_lock(), Err(TryLockError::WouldBlock)));
+                if !is_taken {
+                    clear(&entry.path(), depth + 1);
+                }
+            }
             Ok(kind) if kind.is_file() && is_unfinished => {
                 let _ = std::fs::remove_file(entry.path());
             }

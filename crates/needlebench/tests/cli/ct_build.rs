@@ -198,6 +198,18 @@ fn nothing_outlives_its_build(bench: &Bench, arguments: &str) {
     // The same build once more leaves what was made of it.
     let same = bench.run(format!("{arguments} --json")).json();
     assert!(same["set_aside"].is_null(), "{}", same["set_aside"]);
+    // A scenario that was edited is kept.
+    bench.write("patient/scenario.toml", format!("{plan}# mine\n"));
+    let same = bench.run(format!("{arguments} --json")).json();
+    assert_eq!(
+        same["set_aside"]["names"],
+        serde_json::json!(["scenario.toml"])
+    );
+    let mine = format!(
+        "patient/{}/scenario.toml",
+        same["set_aside"]["folder"].word()
+    );
+    assert!(bench.text(&mine).ends_with("# mine\n"));
 
     let markers = bench.text("ct/marker_list.toml");
     let moved = markers.replace("frame = \"base_link\"", "frame = \"base\"");
@@ -214,6 +226,7 @@ fn nothing_outlives_its_build(bench: &Bench, arguments: &str) {
         .map(Json::word)
         .collect();
     let derived = [
+        "report.json",
         "planned.toml",
         "routes.json",
         "scenario.toml",
@@ -234,7 +247,7 @@ fn nothing_outlives_its_build(bench: &Bench, arguments: &str) {
         ["phantom.build.sha256", "another build", "plan again"],
     );
     let refused = check(&format!("{former}/planned.toml"));
-    holds(&refused, ["phantom.build.report", "moved aside"]);
+    holds(&refused, ["phantom.parts[0].file"]);
 
     // Nor are surfaces of another build, or what a build left that was interrupted.
     let bone = bench.path("patient/surfaces/bone.stl");

@@ -12,7 +12,7 @@ use super::tag::{self, Tag};
 use crate::ImagingError;
 use crate::read::PatientPosition;
 use crate::read::scalar::{Kind, Rescale, Stored};
-use crate::structures::structure_of;
+use crate::structures::{SurfaceTissue, structure_of};
 
 /// Kinds of objects that are images of CT: of one slice, of many, and made of many.
 const CT_IMAGES: [&str; 3] = [
@@ -464,6 +464,15 @@ fn segment_name(item: &DataSet, number: u16) -> String {
         None => name,
     });
     let label = item.text(tag::SEGMENT_LABEL);
+    let is_lesion = |name: &String| {
+        structure_of(name).is_some_and(|structure| structure.tissue == SurfaceTissue::Lesion)
+    };
+    // Lesions of one type are several: each keeps its own name, too.
+    let coded = match (coded, &label) {
+        (Some(coded), Some(label)) if is_lesion(&coded) => Some(format!("{coded} {label}")),
+        (Some(coded), None) if is_lesion(&coded) => Some(format!("{coded} {number}")),
+        (coded, _) => coded,
+    };
     let mut names = label.iter().chain(&coded);
     let known = names.find(|name| structure_of(name).is_some());
     let name = known.or(label.as_ref()).or(coded.as_ref());

@@ -125,7 +125,7 @@ fn phases(slices: Vec<Slice>) -> Vec<(Vec<Slice>, usize)> {
         let are_whole = parts
             .values()
             .all(|part| part.len() > 1 && duplicates(part).is_empty());
-        if parts.len() < 2 || !are_whole {
+        if parts.len() < 2 || !are_whole || way >= TIMES && !are_at_the_same_places(&parts) {
             continue;
         }
         let mut parts: Vec<_> = parts.into_iter().collect();
@@ -144,6 +144,21 @@ fn phases(slices: Vec<Slice>) -> Vec<(Vec<Slice>, usize)> {
         }
     }
     vec![(slices, copies)]
+}
+
+/// The first of the ways to tell phases that is a time: it may also differ from one turn of the tube to the next.
+const TIMES: usize = 5;
+
+fn are_at_the_same_places(parts: &BTreeMap<Option<String>, Vec<Slice>>) -> bool {
+    let places = |part: &[Slice]| -> Vec<_> {
+        let planes = part.iter().map(|slice| slice.plane.as_ref().ok());
+        planes
+            .map(|plane| plane.map(|plane| plane.position_mm))
+            .collect()
+    };
+    let mut all = parts.values().map(|part| places(part));
+    let first = all.next();
+    all.all(|places| Some(places) == first)
 }
 
 /// Without files that are there twice, of slices in order.

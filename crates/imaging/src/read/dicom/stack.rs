@@ -187,11 +187,14 @@ fn grid(plane: &Plane, step_mm: Vector3<f64>, size: [usize; 3]) -> Result<VoxelG
 fn same_place(a: &Slice, b: &Slice, height_mm: f64) -> ImagingError {
     if Arc::ptr_eq(&a.file, &b.file) {
         return ImagingError::refused(format!(
-            "its {} frames have no position of their own",
+            "frames {} and {} of {} have the same position: they have no positions of their own, or are of several \
+             phases",
+            a.frame + 1,
+            b.frame + 1,
             a.file.frames
         ))
         .at(a.file.name.clone())
-        .hint("export it as one file for each slice, or as enhanced CT with a position for each frame");
+        .hint("export one phase as one file for each slice, or as enhanced CT with a position for each frame");
     }
     ImagingError::refused(format!(
         "two slices are at the same position, {height_mm:.3} mm along the slice normal"

@@ -171,7 +171,7 @@ fn frames_without_positions_are_called_that() {
     slice.pixels = slice.pixels.repeat(3);
     let said = refusal(read_as("a.dcm", &slice.bytes()));
     assert!(
-        said.contains("its 3 frames have no position of their own"),
+        said.contains("frames 1 and 2 of 3 have the same position"),
         "{said}"
     );
 }

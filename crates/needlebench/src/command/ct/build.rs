@@ -221,7 +221,8 @@ fn make(
         .map_err(stopped)?;
     position::lay(
         arguments.posture.map(Posture::from),
-        &mut given.room,
+        &mut given.room.scenario,
+        &given.room.resolved,
         &mut built,
     );
     let written = write(arguments, &given.room, &built, control);
@@ -265,8 +266,8 @@ fn refused(scenario: &Path, given: &Given, built: &ScanBuild) -> Vec<Finding> {
         for finding in &mut findings {
             if finding.key.as_deref() == Some("phantom.position_mm") {
                 finding.hint = Some(
-                    "--markers place the patient, --room places table and fixtures: give `--room SCENARIO` this room's \
-                     `table.top_height_mm` and robot base, or no [table]"
+                    "the markers place the patient, the room places the table: in the file of --room, set \
+                     `table.top_height_mm` and the robot's base as they are, or remove [table]"
                         .to_owned(),
                 );
             }
@@ -362,10 +363,10 @@ fn write<'b>(
 }
 
 /// The room, from its file or the default one.
-pub(super) struct OwnRoom {
-    pub scenario: needlebench_scenario::scenario::Scenario,
-    pub resolved: needlebench_scenario::ResolvedScenario,
-    pub folder: PathBuf,
+struct OwnRoom {
+    scenario: needlebench_scenario::scenario::Scenario,
+    resolved: needlebench_scenario::ResolvedScenario,
+    folder: PathBuf,
 }
 
 fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, Stop> {

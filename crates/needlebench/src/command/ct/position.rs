@@ -4,9 +4,8 @@ use needlebench_bench::ct::{PatientFrame, ScanBuild};
 use needlebench_imaging::Remark;
 use needlebench_imaging::read::{Lying, PatientPosition};
 use needlebench_imaging::registration::ReferenceFrame;
-use needlebench_scenario::scenario::{PhantomSection, Posture};
-
-use super::build::OwnRoom;
+use needlebench_scenario::ResolvedScenario;
+use needlebench_scenario::scenario::{GantrySection, PhantomSection, Posture, Scenario};
 
 fn posture(lying: Lying) -> Posture {
     match lying {
@@ -28,14 +27,19 @@ fn word(posture: Posture) -> &'static str {
 
 /// Lays the patient in the room: as `given`, else as the scan says, else as the room has it. Markers that register the
 /// robot place the patient themselves; they are compared with what the scan says.
-pub(super) fn lay(given: Option<Posture>, room: &mut OwnRoom, built: &mut ScanBuild) {
+pub(super) fn lay(
+    given: Option<Posture>,
+    room: &mut Scenario,
+    resolved: &ResolvedScenario,
+    built: &mut ScanBuild,
+) {
     let scanned = built.seen.source.patient_position;
     let mut remarks = Vec::new();
     let pose = built.registered.as_ref().and_then(|registered| {
         let is_robot = registered.registration.frame == ReferenceFrame::Robot;
         let reference_from_ct = registered.registration.reference_from_ct;
         is_robot.then(|| {
-            let world_from_robot = room.resolved.cell.robot.world_from_base_link;
+            let world_from_robot = resolved.cell.robot.world_from_base_link;
             world_from_robot * reference_from_ct * PatientFrame::of(built).ct_from_phantom()
         })
     });
@@ -50,7 +54,8 @@ pub(super) fn lay(given: Option<Posture>, room: &mut OwnRoom, built: &mut ScanBu
                 word(section.posture)
             ));
         }
-    } else if let Some(phantom) = &mut room.scenario.phantom {
+    } else {
+        let phantom = room.phantom.get_or_insert_default();
         let wanted = given.or(scanned.map(|scanned| posture(scanned.lying)));
         if let (Some(given), Some(scanned)) = (given, scanned)
             && given != posture(scanned.lying)
@@ -74,9 +79,9 @@ pub(super) fn lay(given: Option<Posture>, room: &mut OwnRoom, built: &mut ScanBu
             phantom.body_roll_deg = 0.0;
             phantom.head_up_deg = 0.0;
         }
-        let gantry = room.scenario.gantry.as_ref();
-        let isocentre_mm = gantry.map(|gantry| gantry.isocentre_mm);
-        remarks.extend(scanned.and_then(|scanned| turn(scanned, phantom, isocentre_mm)));
+        let scanned = scanned.filter(|_| given.is_none());
+        let gantry = room.gantry.as_ref();
+        remarks.extend(scanned.and_then(|scanned| turn(scanned, phantom, gantry)));
     }
     let remarks = remarks.into_iter().map(Remark::new);
     built
@@ -88,19 +93,21 @@ pub(super) fn lay(given: Option<Posture>, room: &mut OwnRoom, built: &mut ScanBu
 fn turn(
     scanned: PatientPosition,
     phantom: &mut PhantomSection,
-    isocentre_mm: Option<[f64; 3]>,
+    gantry: Option<&GantrySection>,
 ) -> Option<String> {
-    let Some(isocentre_mm) = isocentre_mm else {
+    let Some(gantry) = gantry else {
         return (!scanned.head_first).then(|| {
             format!(
-                "the scan was made {scanned}; the room has no gantry, so the head points as its `head_yaw_deg` says"
+                "the scan was made {scanned}; the room has no gantry: the head points along its `phantom.head_yaw_deg`"
             )
         });
     };
     let (sine, cosine) = libm::sincos(phantom.head_yaw_deg.to_radians());
-    let [x, y] = [0, 1].map(|axis| isocentre_mm[axis] - phantom.position_mm[axis]);
-    let is_head_first = x * cosine + y * sine > 0.0;
-    if is_head_first == scanned.head_first {
+    let [x, y] = [0, 1].map(|axis| gantry.isocentre_mm[axis] - phantom.position_mm[axis]);
+    let ahead_mm = x * cosine + y * sine;
+    // Within the bore, neither end is nearer to it.
+    let is_inside = ahead_mm.abs() <= 0.5 * gantry.depth_mm;
+    if is_inside || (ahead_mm > 0.0) == scanned.head_first {
         return None;
     }
     phantom.head_yaw_deg += if phantom.head_yaw_deg > 0.0 {

@@ -45,8 +45,8 @@ impl Report {
                     format!("this is of another build than {file}"),
                 )
                 .hint(
-                    "the folder was built again since: plan again with `needlebench view` or \
-                     `needlebench ct routes`",
+                    "the folder was built again since, or its report changed: plan again with `needlebench view` or \
+                     `needlebench ct routes`, or build the folder again",
                 ));
         }
         let report: Self = serde_json::from_str(&text).map_err(|error| {
