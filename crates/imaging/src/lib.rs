@@ -49,8 +49,8 @@ pub use reconstruct::{
 };
 pub use resample::{Resampled, resample, resample_labels};
 pub use segment::{
-    Body, Bone, FIRST_LESION, Label, LabelFacts, Lesion, LesionSeed, Levels, Lung, Lungs,
-    Segmentation, Side, label_map, segment,
+    Beside, BesideKind, Body, Bone, FIRST_LESION, Label, LabelFacts, Lesion, LesionSeed, Levels,
+    Lung, Lungs, Segmentation, Side, label_map, segment,
 };
 pub use structures::{Structure, SurfaceTissue, structure_of};
 pub use surface::{Field, Level, SurfaceError, Values};

@@ -349,6 +349,21 @@ fn jobs<'a>(
         sizes.other,
         SMALL_CELL_M,
     );
+    for each in &found.beside {
+        let runs = Runs::At {
+            level_hu: levels.skin_hu,
+            typical: [SOFT, AIR],
+        };
+        add(
+            each.kind.name(),
+            SurfaceTissue::Beside,
+            each.bounds,
+            &each.mask,
+            runs,
+            sizes.other,
+            LARGE_CELL_M,
+        );
+    }
     if let Some(mask) = other_bone {
         jobs.push(Job {
             name: OTHER_BONE.to_owned(),
@@ -543,7 +558,7 @@ fn keep_within_skin(surfaces: &mut [Surface], remarks: &mut Vec<Remark>) {
         return;
     };
     for surface in surfaces {
-        if surface.tissue == SurfaceTissue::Skin {
+        if matches!(surface.tissue, SurfaceTissue::Skin | SurfaceTissue::Beside) {
             continue;
         }
         let mut mesh = surface.mesh.clone();

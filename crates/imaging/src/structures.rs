@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::segment::BesideKind;
+
 /// What a surface is of, in the words of `[[phantom.parts]]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -18,6 +20,8 @@ pub enum SurfaceTissue {
     Lung,
     /// Lesion.
     Lesion,
+    /// Beside the body: an arm, the couch, a cushion.
+    Beside,
 }
 
 /// What a label stands for. Labels with the same name are one structure.
@@ -328,6 +332,13 @@ pub fn structure_of(name: &str) -> Option<Structure> {
         return Some(Structure {
             name: "skin".to_owned(),
             tissue: SurfaceTissue::Skin,
+        });
+    }
+    // Of this program; no name of others means just that.
+    if BesideKind::ALL.iter().any(|kind| kind.name() == lower) {
+        return Some(Structure {
+            name: lower,
+            tissue: SurfaceTissue::Beside,
         });
     }
     let has = |wanted: &[&str]| wanted.iter().all(|word| words.contains(word));

@@ -159,6 +159,8 @@ pub struct Phantom {
     pub lesions: Vec<Lesion>,
     /// Skin markers, in the order of the parameters.
     pub markers: Vec<Marker>,
+    /// What lies beside the body in the scan that it is from: arms, the couch. Carried along with it.
+    pub beside: Vec<PhantomPart>,
     skin_surface: SkinSurface,
     /// Where a scan ends that the parts are from; none if it ends nowhere.
     scan_ends: Option<ScanEnds>,
@@ -222,6 +224,7 @@ impl Phantom {
             parts,
             lesions,
             markers,
+            beside: Vec::new(),
             skin_surface: SkinSurface::Convex(skin_faces),
             scan_ends: None,
             route_obstacles: route_obstacles::OnDemand::default(),
@@ -241,10 +244,17 @@ impl Phantom {
             parts,
             lesions,
             markers,
+            beside: Vec::new(),
             skin_surface,
             scan_ends: None,
             route_obstacles: route_obstacles::OnDemand::default(),
         }
+    }
+
+    /// The same, with these beside the body.
+    #[must_use]
+    pub fn with_beside(self, beside: Vec<PhantomPart>) -> Self {
+        Self { beside, ..self }
     }
 
     /// The same, of a scan with these ends.

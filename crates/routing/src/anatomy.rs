@@ -89,8 +89,8 @@ pub trait Anatomy: Sync {
     /// Where a ray leaves the body for the first time.
     fn exit(&self, ray: &Ray) -> Exit;
 
-    /// Whether body or a marker is in the way outside the skin, between two distances from the target, m: an arm, a
-    /// fold.
+    /// Whether body, a marker or what lies beside the body is in the way outside the skin, between two distances from
+    /// the target, m: an arm, a fold, the couch.
     fn is_body_between(&self, ray: &Ray, from_to_m: [f64; 2]) -> bool;
 
     /// Whether the patient model has any structure of this kind: otherwise its distances are unknown.

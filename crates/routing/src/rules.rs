@@ -14,7 +14,7 @@ pub enum RouteRule {
     End,
     /// The needle does not reach from the guide to the target.
     NeedleTooShort,
-    /// An arm, a fold or a marker is in the way of guide and needle.
+    /// An arm, a fold, a marker or the couch is in the way of guide and needle.
     Outside,
     /// Too close to bone.
     Bone,
@@ -83,7 +83,7 @@ impl RouteRule {
             Self::NoSkin => "no skin found",
             Self::End => "scan or model ends before the skin",
             Self::NeedleTooShort => "needle too short",
-            Self::Outside => "arm, fold or marker on the skin",
+            Self::Outside => "arm, couch, fold or marker in the way",
             Self::Oblique => "too oblique to the skin",
             Self::Bone => "too close to bone",
             Self::Vessel => "too close to a vessel",

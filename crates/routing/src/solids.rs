@@ -36,6 +36,8 @@ pub struct SolidAnatomy<'a> {
     bullae: Vec<Hollow>,
     /// Radius of the lesion around the target, m.
     lesion_radius_m: f64,
+    /// What lies beside the body.
+    beside: Vec<Hollow>,
     highest_m: f64,
     /// Middle and radius, m.
     markers: Vec<(Point3<f64>, f64)>,
@@ -139,6 +141,7 @@ impl<'a> SolidAnatomy<'a> {
                 .map(Hollow::of)
                 .collect(),
             lesion_radius_m: lesion.map_or(0.0, |lesion| 0.5 * lesion.diameter_m),
+            beside: phantom.beside.iter().map(Hollow::of).collect(),
             highest_m: size.map_or(f64::INFINITY, |size| HIGHEST * 0.5e-3 * size.length_mm),
             markers: phantom
                 .markers
@@ -207,7 +210,12 @@ impl Anatomy for SolidAnatomy<'_> {
         // Half a micrometre off the skin that it leaves.
         let outside = ray.at(from_m + 5e-7);
         let again = self.phantom.skin_intersection(&outside, &ray.outwards);
-        again.is_some_and(|(enters_m, leaves_m)| leaves_m > 0.0 && enters_m < to_m - from_m)
+        let again = again
+            .into_iter()
+            .map(|(enters, leaves)| (enters + from_m, leaves + from_m));
+        let beside = self.beside.iter().flat_map(|it| it.stretches_m(ray));
+        let mut in_the_way = again.chain(beside);
+        in_the_way.any(|(enters_m, leaves_m)| leaves_m > from_m && enters_m < to_m)
     }
 
     fn distance_m(&self, ray: &Ray, from_to_m: [f64; 2], obstacle: Obstacle) -> f64 {

@@ -265,6 +265,7 @@ pub(super) fn part_tissue(tissue: SurfaceTissue) -> PartTissue {
         SurfaceTissue::Organ => PartTissue::Organ,
         SurfaceTissue::Lung => PartTissue::Lung,
         SurfaceTissue::Lesion => PartTissue::Lesion,
+        SurfaceTissue::Beside => PartTissue::Beside,
     }
 }
 

@@ -23,9 +23,6 @@ const LEAST_BODY_L: f64 = 0.05;
 /// Share of a volume without air that no body has: even a field of view within a chest has lungs.
 const FILLED: f64 = 0.9;
 
-/// Something beside the body that is worth a remark.
-const OTHER_PART_L: f64 = 0.2;
-
 /// Outside air; lungs that the field of view cuts are denser.
 const OUTSIDE_HU: f64 = -940.0;
 
@@ -174,7 +171,6 @@ fn without_bed(
                 2e3 * radius_m
             )));
         }
-        note_others(scan, &parts, largest, remarks);
         let kept = parts.mask_of(|part| part == largest);
         // Rounding of the ball to voxels takes a layer off some corners.
         let layer_m = 1.5 * scan.spacing_m[0].max(scan.spacing_m[1]);
@@ -183,23 +179,6 @@ fn without_bed(
         return Ok(solid);
     }
     Err(nothing_there())
-}
-
-fn note_others(scan: &Scan<'_>, parts: &Components, body: usize, remarks: &mut Vec<Remark>) {
-    let others = parts.parts().iter().enumerate();
-    for (_, other) in others.filter(|(part, _)| *part != body) {
-        let litres = scan.litres(other.voxels);
-        if litres < OTHER_PART_L {
-            continue;
-        }
-        let [i, j, k] = other.centroid();
-        let at = 1e3 * scan.volume.grid.ct_from_index(&Point3::new(i, j, k));
-        remarks.push(Remark::new(format!(
-            "a region of {litres:.1} l at [{:.0}, {:.0}, {:.0}] mm is not connected to the body \
-             and is ignored (an arm, the couch?)",
-            at.x, at.y, at.z
-        )));
-    }
 }
 
 /// With all that it encloses.

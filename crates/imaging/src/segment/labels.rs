@@ -6,7 +6,7 @@ use crate::mask::{IndexBox, Mask};
 use crate::volume::LabelMap;
 use crate::volume::Volume;
 
-use super::{Lesion, Segmentation, Side};
+use super::{BesideKind, Lesion, Segmentation, Side};
 
 /// Numbers of the label maps that this crate makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -28,6 +28,12 @@ pub enum Label {
     ContrastVessels = 7,
     /// Enclosed air that is neither lung nor airway.
     Gas = 8,
+    /// Arms beside the body, with their bones.
+    Arms = 9,
+    /// What the patient lies on.
+    Couch = 10,
+    /// Anything else beside the body.
+    Objects = 11,
 }
 
 /// Label of the first lesion; the others follow in their order.
@@ -35,7 +41,7 @@ pub const FIRST_LESION: u16 = 100;
 
 impl Label {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 11] = [
         Self::SoftTissue,
         Self::LungLeft,
         Self::LungRight,
@@ -44,6 +50,9 @@ impl Label {
         Self::Bone,
         Self::ContrastVessels,
         Self::Gas,
+        Self::Arms,
+        Self::Couch,
+        Self::Objects,
     ];
 
     /// Its name in label maps and reports.
@@ -57,6 +66,9 @@ impl Label {
             Self::Bone => "bone",
             Self::ContrastVessels => "contrast_vessels",
             Self::Gas => "gas",
+            Self::Arms => BesideKind::Arms.name(),
+            Self::Couch => BesideKind::Couch.name(),
+            Self::Objects => BesideKind::Objects.name(),
         }
     }
 }
@@ -89,6 +101,14 @@ pub fn label_map(
             .collect(),
     };
     let whole = IndexBox::whole(volume.grid.size());
+    for each in &found.beside {
+        let label = match each.kind {
+            BesideKind::Arms => Label::Arms,
+            BesideKind::Couch => Label::Couch,
+            BesideKind::Objects => Label::Objects,
+        };
+        paint(&mut map, &each.bounds, &each.mask, label as u16);
+    }
     paint(&mut map, &whole, &found.body.mask, Label::SoftTissue as u16);
     for lung in &found.lungs.lungs {
         let label = match lung.side {

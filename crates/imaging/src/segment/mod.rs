@@ -1,5 +1,6 @@
 //! Tissues of a CT volume of the chest, by Hounsfield units and shape, without learning.
 
+mod beside;
 mod body;
 mod bone;
 mod labels;
@@ -15,6 +16,7 @@ use crate::mask::{IndexBox, Mask};
 use crate::spacing::{orthogonal, whole};
 use crate::volume::Volume;
 
+pub use beside::{Beside, BesideKind};
 pub use body::Body;
 pub(crate) use body::SKIN_LEVEL_HU;
 pub(crate) use bone::BONE_LEVEL_HU;
@@ -31,6 +33,8 @@ pub use lungs::{Lung, Lungs, Side};
 pub struct Segmentation {
     /// The patient without the couch.
     pub body: Body,
+    /// Arms, couch and what else is beside the patient.
+    pub beside: Vec<Beside>,
     /// Lungs, airways, vessels in the lungs.
     pub lungs: Lungs,
     /// Bone, and vessels with contrast medium.
@@ -108,11 +112,13 @@ pub fn segment(
     };
     let mut remarks = Vec::new();
     let body = body::find(&scan, seen, &mut remarks)?;
+    let beside = beside::find(&scan, &body, &mut remarks)?;
     let lungs = lungs::find(&scan, &body, &mut remarks)?;
     let bone = bone::find(&scan, &body, &lungs, &mut remarks)?;
     upright::check(&scan, &body, &lungs, &bone)?;
     Ok(Segmentation {
         body,
+        beside,
         lungs,
         bone,
         remarks,

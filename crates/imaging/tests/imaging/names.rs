@@ -18,6 +18,7 @@ fn every_published_class_name_is_the_tissue_that_is_meant() {
             SurfaceTissue::Organ => "organ",
             SurfaceTissue::Lung => "lung",
             SurfaceTissue::Lesion => "lesion",
+            SurfaceTissue::Beside => "beside",
         });
         count += 1;
         if found != meant {

@@ -11,7 +11,7 @@ use super::skin_map::{HIGHEST_DEG, numbered, skin_panel};
 /// Colours of rules, told apart by lightness too.
 const RULES: [(&str, &str, Rgb); 12] = [
     ("needle_too_short", "needle too short", [226, 226, 226]),
-    ("outside", "arm, fold or marker", [120, 120, 120]),
+    ("outside", "arm, couch or marker", [120, 120, 120]),
     ("end_of_body", "skin unknown", [176, 190, 220]),
     ("oblique", "too oblique", [206, 214, 235]),
     ("bone", "bone", [150, 110, 60]),

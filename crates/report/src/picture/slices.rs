@@ -42,6 +42,7 @@ fn color(tissue: SurfaceTissue) -> [u8; 3] {
         SurfaceTissue::Organ => [170, 130, 240],
         SurfaceTissue::Lung => [90, 190, 250],
         SurfaceTissue::Lesion => [90, 240, 110],
+        SurfaceTissue::Beside => [150, 160, 175],
     }
 }
 

@@ -5,11 +5,12 @@ use needlebench_parallel::in_parts;
 /// Voxels along each side of a block.
 pub(super) const BLOCK: usize = 8;
 
-/// Of the body, or not.
+/// Of the body, or not, as bits: what is beside the body is outside of it, too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BodySide {
     Outside = 1,
     Body = 2,
+    Beside = 4,
 }
 
 /// Blocks of voxels, and which sides of the body each has voxels of.
@@ -18,21 +19,21 @@ pub(super) struct Blocks {
     pub size: [usize; 3],
     /// Bits of [`BodySide`].
     sides: Vec<u8>,
-    /// The side of each class.
-    side_of: [u8; 256],
+    /// The sides of each class.
+    sides_of: [u8; 256],
 }
 
 impl Blocks {
-    /// Of a box of classes, each of which is on a side.
+    /// Of a box of classes, each of which has sides.
     pub fn of(
         voxels: &[u8],
         [nx, ny, nz]: [usize; 3],
-        side: impl Fn(u8) -> BodySide,
+        of_class: impl Fn(u8) -> u8,
         threads: usize,
     ) -> Self {
         let size = [nx, ny, nz].map(|count| count.div_ceil(BLOCK));
-        let side_of: [u8; 256] =
-            std::array::from_fn(|class| u8::try_from(class).map_or(0, |class| side(class) as u8));
+        let sides_of: [u8; 256] =
+            std::array::from_fn(|class| u8::try_from(class).map_or(0, &of_class));
         let layer = size[0] * size[1];
         let mut sides = vec![0; layer * size[2]];
         let of_layer = |(): &mut (), part: usize, sides: &mut [u8]| {
@@ -42,7 +43,7 @@ impl Blocks {
                     let sides = &mut sides[j / BLOCK * size[0]..];
                     for (block, voxels) in sides.iter_mut().zip(row.chunks(BLOCK)) {
                         for &class in voxels {
-                            *block |= side_of[usize::from(class)];
+                            *block |= sides_of[usize::from(class)];
                         }
                     }
                 }
@@ -52,14 +53,14 @@ impl Blocks {
         Self {
             size,
             sides,
-            side_of,
+            sides_of,
         }
     }
 
-    /// Whether a class is on a side.
+    /// Whether a class has a side.
     #[inline]
     pub fn is(&self, class: u8, side: BodySide) -> bool {
-        self.side_of[usize::from(class)] == side as u8
+        self.sides_of[usize::from(class)] & side as u8 != 0
     }
 
     /// Whether a block has a voxel of a side.

@@ -10,6 +10,8 @@ use crate::Obstacle;
 pub(super) enum Kind {
     /// Not of the body.
     Outside,
+    /// Not of the body, and not air: arms, couch.
+    Beside,
     /// What it may pass.
     Soft,
     /// Of a lung, by number.
@@ -58,7 +60,7 @@ impl Class {
             Kind::InLung => obstacle == Obstacle::Vessel && self.mark == Mark::LungVessel,
             Kind::Organ => obstacle == Obstacle::Organ,
             Kind::Lung(lung) => obstacle == Obstacle::Organ && target_lung != Some(lung),
-            Kind::Outside | Kind::Soft | Kind::Lesion => false,
+            Kind::Outside | Kind::Beside | Kind::Soft | Kind::Lesion => false,
         }
     }
 }
@@ -106,11 +108,14 @@ impl Classes {
         }
     }
 
-    /// On which side of the skin a class is. What is added later is found within the body.
-    pub fn side(&self, number: u8) -> BodySide {
+    /// On which sides of the skin a class is. What is added later is found within the body.
+    pub fn sides(&self, number: u8) -> u8 {
         match self.all.get(usize::from(number)) {
-            Some(class) if class.kind == Kind::Outside => BodySide::Outside,
-            _ => BodySide::Body,
+            Some(class) if class.kind == Kind::Outside => BodySide::Outside as u8,
+            Some(class) if class.kind == Kind::Beside => {
+                BodySide::Outside as u8 | BodySide::Beside as u8
+            }
+            _ => BodySide::Body as u8,
         }
     }
 
@@ -153,6 +158,7 @@ impl Classes {
             SurfaceTissue::Vessel => Kind::Vessel,
             SurfaceTissue::Organ => Kind::Organ,
             SurfaceTissue::Lesion => Kind::Lesion,
+            SurfaceTissue::Beside => Kind::Beside,
             SurfaceTissue::Lung => Kind::Lung(self.lung(&structure.name)),
         };
         Class {

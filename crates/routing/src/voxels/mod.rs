@@ -145,7 +145,7 @@ impl VoxelAnatomy {
         let blocks = Blocks::of(
             &voxels,
             within.size(),
-            |class| classes.side(class),
+            |class| classes.sides(class),
             options.threads,
         );
         let mut anatomy = Self {
@@ -171,7 +171,7 @@ impl VoxelAnatomy {
             knows: [false; 3],
             remarks: Vec::new(),
         };
-        if anatomy.kind_at(centre) == Kind::Outside {
+        if matches!(anatomy.kind_at(centre), Kind::Outside | Kind::Beside) {
             return Err(ImagingError::refused("the target is outside the body")
                 .hint("coordinates are in mm in the scan's frame (left, posterior, superior)"));
         }

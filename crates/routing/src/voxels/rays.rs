@@ -334,7 +334,9 @@ impl Anatomy for VoxelAnatomy {
         // Past the voxel that the skin cuts.
         let past_m = from_m + self.diagonal_m();
         let stretch_m = [past_m, to_m.max(past_m)];
-        self.first_on(ray, stretch_m, BodySide::Body).is_some()
+        // What touches the skin begins right there.
+        let beside = self.first_on(ray, [from_m, to_m], BodySide::Beside);
+        beside.is_some() || self.first_on(ray, stretch_m, BodySide::Body).is_some()
     }
 
     fn knows(&self, obstacle: Obstacle) -> bool {
@@ -360,7 +362,9 @@ impl Anatomy for VoxelAnatomy {
     }
 
     fn skin_normal(&self, ray: &Ray, depth_m: f64) -> UnitVector3<f64> {
-        self.normal_near(&ray.at(depth_m), |kind| kind != Kind::Outside)
+        self.normal_near(&ray.at(depth_m), |kind| {
+            !matches!(kind, Kind::Outside | Kind::Beside)
+        })
     }
 
     fn lungs(&self, ray: &Ray, from_to_m: [f64; 2]) -> LungPassage {

@@ -178,6 +178,9 @@ pub enum PartTissue {
     Lung,
     /// A target that goals refer to.
     Lesion,
+    /// Beside the patient in the scan: an arm, the couch, a cushion. It moves with the patient and counts as the
+    /// patient in clearances; no needle passes through it.
+    Beside,
 }
 
 /// A part of the phantom from a mesh file.
@@ -190,7 +193,7 @@ pub struct PartSection {
     /// STL, OBJ or COLLADA (`.dae`) file, relative to this file: a closed surface, its triangles
     /// counter-clockwise seen from outside.
     pub file: String,
-    /// Tissue: `skin`, `bone`, `vessel`, `organ`, `lung` or `lesion`.
+    /// Tissue: `skin`, `bone`, `vessel`, `organ`, `lung`, `lesion` or `beside`.
     pub tissue: PartTissue,
     /// Unit of the file's coordinates: `mm`, `cm`, `m` or `in`. Default mm; COLLADA files state their own unit. An
     /// implausible size is rejected.

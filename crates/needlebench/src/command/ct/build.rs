@@ -391,13 +391,16 @@ fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, St
 }
 
 /// Reserved names of surfaces.
-const TAKEN: [&str; 6] = [
+const TAKEN: [&str; 9] = [
     "skin",
     "bone",
     "trachea",
     "lung_left",
     "lung_right",
     "contrast_vessels",
+    "arms",
+    "couch",
+    "objects",
 ];
 
 fn lesions(arguments: &BuildArguments, read: &ReadVolume) -> Result<Vec<LesionSeed>, Stop> {

@@ -18,11 +18,16 @@ pub struct PlacedPhantom {
     pub phantom: Arc<Phantom>,
     /// Its place.
     pub world_from_phantom: Pose,
-    /// Head and arms, as far as the scenario has them; phantom frame.
+    /// Head and arms, as far as the scenario has them, and what a scan shows beside the body; phantom frame.
     pub limbs: Vec<PhantomPart>,
 }
 
 impl PlacedPhantom {
+    /// How many of [`Self::outside`] are the chest, head and arms; what a scan shows beside the body follows.
+    pub(crate) fn modelled(&self) -> usize {
+        1 + self.limbs.len() - self.phantom.beside.len()
+    }
+
     /// What of the patient can be touched, in the world: the skin of the chest, then head and arms.
     pub fn outside(&self) -> impl Iterator<Item = Solid> {
         let limbs = self.limbs.iter().map(|part| &part.solid);
@@ -61,7 +66,7 @@ pub(crate) fn place_phantom(
         world_from_phantom.translation.vector.z =
             (table.top_height_mm + section.position_mm[2]) * 1e-3 + lowest_m;
     }
-    let limbs = match limb_sizes(toml, section, &phantom.phantom)? {
+    let mut limbs = match limb_sizes(toml, section, &phantom.phantom)? {
         Some(parameters) => {
             let support = Support {
                 down: UnitVector3::new_normalize(down),
@@ -71,6 +76,7 @@ pub(crate) fn place_phantom(
         }
         None => Vec::new(),
     };
+    limbs.extend(phantom.phantom.beside.iter().cloned());
     Ok(PlacedPhantom {
         phantom: Arc::clone(&phantom.phantom),
         world_from_phantom,

@@ -82,6 +82,11 @@ impl Standing<'_> {
         }
         let limbs: Vec<(PreparedShape, Solid)> = placed
             .outside()
+            .take(match beside {
+                Beside::Base | Beside::Mount => usize::MAX,
+                // The couch of a scan lies where the room has its table.
+                _ => placed.modelled(),
+            })
             .skip(1)
             .map(|limb| (PreparedShape::new(&limb.shape), limb))
             .collect();

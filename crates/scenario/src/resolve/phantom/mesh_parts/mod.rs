@@ -19,7 +19,7 @@ use read::{PartMesh, read_part};
 
 fn tissue_of(tissue: PartTissue) -> Tissue {
     match tissue {
-        PartTissue::Skin => Tissue::Skin,
+        PartTissue::Skin | PartTissue::Beside => Tissue::Skin,
         PartTissue::Bone => Tissue::Bone,
         PartTissue::Vessel => Tissue::Vessel,
         PartTissue::Organ | PartTissue::Lung => Tissue::Organ,
@@ -35,6 +35,7 @@ fn color_rgba(tissue: PartTissue) -> [f32; 4] {
         PartTissue::Organ => [0.60, 0.28, 0.24, 0.8],
         PartTissue::Lung => [0.86, 0.60, 0.62, 0.55],
         PartTissue::Lesion => LESION_RGBA,
+        PartTissue::Beside => [0.62, 0.64, 0.68, 1.0],
     }
 }
 
@@ -92,10 +93,12 @@ pub(crate) fn with_mesh_parts(
         }
     }
 
-    let mut skin_surface = None;
+    let (mut skin_surface, mut beside) = (None, Vec::new());
     for (index, (section, mesh)) in sections.iter().zip(&meshes).enumerate() {
         let part = part_of(toml, index, section, mesh, notes)?;
-        if part.tissue == Tissue::Skin {
+        if section.tissue == PartTissue::Beside {
+            beside.push(part);
+        } else if part.tissue == Tissue::Skin {
             skin_surface = Some(match HalfSpaces::of(&part.solid) {
                 Some(faces) => SkinSurface::Convex(faces),
                 None => SkinSurface::Mesh(Box::new(SurfaceIndex::new(mesh.surface.clone()))),
@@ -125,7 +128,7 @@ pub(crate) fn with_mesh_parts(
         }
     }
     let phantom = Phantom::of_parts(parameters, parts, lesions, markers, skin_surface);
-    Ok((phantom, sources))
+    Ok((phantom.with_beside(beside), sources))
 }
 
 /// Takes away what the user's parts stand for.

@@ -99,7 +99,13 @@ pub(super) fn note_overlaps(
     notes: &mut Vec<String>,
 ) {
     let solid: Vec<usize> = (0..sections.len())
-        .filter(|&i| !matches!(sections[i].tissue, PartTissue::Skin | PartTissue::Lesion))
+        .filter(|&i| {
+            let tissue = sections[i].tissue;
+            !matches!(
+                tissue,
+                PartTissue::Skin | PartTissue::Lesion | PartTissue::Beside
+            )
+        })
         .collect();
     for (at, &a) in solid.iter().enumerate() {
         for &b in &solid[at + 1..] {
