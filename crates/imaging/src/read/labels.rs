@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use super::nifti::Nifti;
-use super::{Format, ReadOptions, dicom, format_of, zeroed};
+use super::voxels::StoredVoxels;
+use super::{Format, ReadOptions, dicom, format_of, nifti, zeroed};
 use crate::{ImagingError, LabelMap, Remark, VoxelGrid};
 
 /// Distance between corners up to which two grids are the same.
@@ -33,21 +33,20 @@ pub fn read_labels(
             let (labels, remarks) = dicom::read_segmentation(path, grid, options, cancel)?;
             Ok(ReadLabels { labels, remarks })
         }
-        Format::Nifti => from_nifti(path, grid, options, cancel),
+        Format::Nifti => of_stored(nifti::open(path, options)?, grid, options, cancel),
     }
 }
 
-fn from_nifti(
-    path: &Path,
+fn of_stored(
+    stored: StoredVoxels,
     grid: &VoxelGrid,
     options: &ReadOptions,
     cancel: &AtomicBool,
 ) -> Result<ReadLabels, ImagingError> {
-    let nifti = Nifti::open(path, options)?;
-    let mut remarks = nifti.remarks().to_vec();
-    let own = nifti.grid().clone();
+    let mut remarks = stored.header().remarks.clone();
+    let own = stored.header().grid.clone();
     let order = Order::between(&own, grid)?;
-    let (values, of_bytes) = nifti.labels(options, cancel)?;
+    let (values, of_bytes) = stored.labels(options, cancel)?;
     remarks.extend(of_bytes);
     let labels = if order.is_same() {
         values

@@ -4,7 +4,9 @@
 //! Where a file leaves room for a guess it is refused; what is used although something about it is odd comes with a
 //! [`Remark`].
 
+mod bytes;
 mod dicom;
+mod fields;
 mod label_names;
 mod labels;
 mod nifti;
@@ -12,6 +14,7 @@ mod patient_position;
 mod placing;
 mod plausibility;
 mod scalar;
+mod voxels;
 
 use std::fs::File;
 use std::io::Read;
@@ -20,8 +23,8 @@ use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
-use self::nifti::Nifti;
 use self::scalar::Tally;
+use self::voxels::StoredVoxels;
 use crate::{ImagingError, Orientation, Remark, Volume, VoxelGrid};
 
 pub use label_names::read_label_names;
@@ -136,7 +139,7 @@ pub fn read_volume(
 ) -> Result<ReadVolume, ImagingError> {
     let _stage = tracing::debug_span!("read", file = %path.display()).entered();
     let read = match format_of(path)? {
-        Format::Nifti => read_nifti(path, options, cancel),
+        Format::Nifti => of_stored(nifti::open(path, options)?, options, cancel),
         Format::Dicom => dicom::read(path, options, threads, cancel),
     }?;
     let grid = &read.volume.grid;
@@ -195,22 +198,23 @@ fn format_of(path: &Path) -> Result<Format, ImagingError> {
     }
 }
 
-fn read_nifti(
-    path: &Path,
+/// The volume of a file with one.
+fn of_stored(
+    stored: StoredVoxels,
     options: &ReadOptions,
     cancel: &AtomicBool,
 ) -> Result<ReadVolume, ImagingError> {
     if let Some(series) = &options.series {
         return Err(ImagingError::refused(format!(
-            "series {series} is requested, but a NIfTI file has one volume"
+            "series {series} is requested, but a {} file has one volume",
+            stored.header().format
         ))
         .hint("omit --series"));
     }
-    let nifti = Nifti::open(path, options)?;
-    let mut remarks = nifti.remarks().to_vec();
-    let grid = nifti.grid().clone();
-    let format = nifti.format();
-    let (hu, tally, of_bytes) = nifti.hu(options, cancel)?;
+    let mut remarks = stored.header().remarks.clone();
+    let grid = stored.header().grid.clone();
+    let format = stored.format();
+    let (hu, tally, of_bytes) = stored.hu(options, cancel)?;
     remarks.extend(of_bytes);
     let volume = Volume {
         grid,

@@ -29,10 +29,11 @@ pub(super) fn centred(
     VoxelGrid::new(size, steps, Point3::from(-(steps * half)))
 }
 
-/// Rejects spacings of another unit, and remarks on those that are probably defaults.
+/// Rejects spacings of another unit, and remarks on those that are probably defaults. `unit_key` is where the header
+/// states a unit other than mm.
 pub(super) fn within_reason(
     grid: &VoxelGrid,
-    is_mm: bool,
+    unit_key: Option<&str>,
     remarks: &mut Vec<Remark>,
 ) -> Result<(), ImagingError> {
     let spacing_m = grid.spacing_m();
@@ -45,10 +46,11 @@ pub(super) fn within_reason(
                 spacing_m[axis] * 1e3,
                 extent_m
             ))
-            .hint(if is_mm {
-                "correct the affine in the header, which is in mm"
-            } else {
-                "correct the unit of length in the header (xyzt_units): most affines are in mm"
+            .hint(match unit_key {
+                None => "correct the affine in the header, which is in mm".to_owned(),
+                Some(key) => format!(
+                    "correct the unit of length in the header ({key}): most affines are in mm"
+                ),
             }));
         }
     }

@@ -77,7 +77,7 @@ pub(super) fn read(
     let label = series.label.clone();
     let stack = stack::stack(series.slices, options.fill_gaps)?;
     remarks.extend(header_remarks(&stack));
-    within_reason(&stack.grid, true, &mut remarks)?;
+    within_reason(&stack.grid, None, &mut remarks)?;
     let measured = stack.slices.len().max(stack.sources.len()) as u64;
     let plane = (stack.grid.size()[0] * stack.grid.size()[1]) as u64;
     let copies = if stack.sources.len() == stack.slices.len() {

@@ -1,88 +1,79 @@
 //! The header: 348 bytes of NIfTI-1, 540 of NIfTI-2.
 
-use super::bytes::ByteStream;
-use super::fields::Fields;
 use super::orientation::{self, Placement};
 use super::version::{BYTES_1, BYTES_2, version_of};
 use crate::read::ReadOptions;
+use crate::read::bytes::ByteStream;
+use crate::read::fields::Fields;
 use crate::read::scalar::{Kind, Rescale, Stored};
-use crate::{ImagingError, Remark, VoxelGrid};
+use crate::read::voxels::Header;
+use crate::{ImagingError, Remark};
 
 const DAMAGED: &str = "the header is damaged: copy or export it again";
 
-/// What a header says of the voxels.
-#[derive(Debug)]
-pub(super) struct Header {
-    pub(super) version: u8,
-    /// Whether the voxels are in a file of their own.
-    pub(super) is_pair: bool,
-    pub(super) stored: Stored,
-    pub(super) rescale: Rescale,
-    pub(super) data_offset: u64,
-    pub(super) grid: VoxelGrid,
-    pub(super) remarks: Vec<Remark>,
+/// Reads it from the beginning of a stream, and whether the voxels are in a file of their own.
+pub(super) fn read(
+    stream: &mut ByteStream,
+    options: &ReadOptions,
+) -> Result<(Header, bool), ImagingError> {
+    let mut bytes = [0; BYTES_2];
+    let mut length = stream.fill(&mut bytes[..BYTES_1])?;
+    let Some((version, is_big_endian)) = version_of(&bytes[..length]) else {
+        return Err(ImagingError::refused(
+            "not a NIfTI file: it does not begin with the header size, 348 or 540",
+        )
+        .hint("a CT is read from .nii, .nii.gz, .hdr with .img, or DICOM"));
+    };
+    if version == 2 && length == BYTES_1 {
+        length += stream.fill(&mut bytes[BYTES_1..])?;
+    }
+    let wanted = if version == 1 { BYTES_1 } else { BYTES_2 };
+    if length < wanted {
+        return Err(ImagingError::refused(format!(
+            "the file is truncated: it ends after {length} of the {wanted} bytes of its \
+                 header"
+        ))
+        .hint("copy or export it again"));
+    }
+    let fields = Fields {
+        bytes: &bytes[..wanted],
+        is_big_endian,
+    };
+    parse(&fields, version, options)
 }
 
-impl Header {
-    pub(super) fn read(
-        stream: &mut ByteStream,
-        options: &ReadOptions,
-    ) -> Result<Self, ImagingError> {
-        let mut bytes = [0; BYTES_2];
-        let mut length = stream.fill(&mut bytes[..BYTES_1])?;
-        let Some((version, is_big_endian)) = version_of(&bytes[..length]) else {
-            return Err(ImagingError::refused(
-                "not a NIfTI file: it does not begin with the header size, 348 or 540",
-            )
-            .hint("a CT is read from .nii, .nii.gz, .hdr with .img, or DICOM"));
-        };
-        if version == 2 && length == BYTES_1 {
-            length += stream.fill(&mut bytes[BYTES_1..])?;
-        }
-        let wanted = if version == 1 { BYTES_1 } else { BYTES_2 };
-        if length < wanted {
-            return Err(ImagingError::refused(format!(
-                "the file is truncated: it ends after {length} of the {wanted} bytes of its \
-                 header"
-            ))
-            .hint("copy or export it again"));
-        }
-        let fields = Fields {
-            bytes: &bytes[..wanted],
-            is_big_endian,
-        };
-        Self::parse(&fields, version, options)
-    }
-
-    fn parse(fields: &Fields, version: u8, options: &ReadOptions) -> Result<Self, ImagingError> {
-        let is_first = version == 1;
-        let is_pair = is_pair(fields, version)?;
-        let size = size(fields, is_first)?;
-        let stored = Stored {
-            kind: kind(fields, is_first)?,
-            is_big_endian: fields.is_big_endian,
-            bits: None,
-        };
-        let mut remarks = Vec::new();
-        let rescale = rescale(fields, is_first)?;
-        let least = match (is_pair, is_first) {
-            (true, _) => 0,
-            (false, true) => BYTES_1 as u64 + 4,
-            (false, false) => BYTES_2 as u64 + 4,
-        };
-        let data_offset = data_offset(fields, is_first, least, &mut remarks)?;
-        let placement = Placement::read(fields, is_first);
-        let grid = orientation::grid(&placement, size, options, &mut remarks)?;
-        Ok(Self {
-            version,
-            is_pair,
-            stored,
-            rescale,
-            data_offset,
-            grid,
-            remarks,
-        })
-    }
+fn parse(
+    fields: &Fields,
+    version: u8,
+    options: &ReadOptions,
+) -> Result<(Header, bool), ImagingError> {
+    let is_first = version == 1;
+    let is_pair = is_pair(fields, version)?;
+    let size = size(fields, is_first)?;
+    let stored = Stored {
+        kind: kind(fields, is_first)?,
+        is_big_endian: fields.is_big_endian,
+        bits: None,
+    };
+    let mut remarks = Vec::new();
+    let rescale = rescale(fields, is_first)?;
+    let least = match (is_pair, is_first) {
+        (true, _) => 0,
+        (false, true) => BYTES_1 as u64 + 4,
+        (false, false) => BYTES_2 as u64 + 4,
+    };
+    let data_offset = data_offset(fields, is_first, least, &mut remarks)?;
+    let placement = Placement::read(fields, is_first);
+    let grid = orientation::grid(&placement, size, options, &mut remarks)?;
+    let header = Header {
+        format: format!("NIfTI-{version}"),
+        stored,
+        rescale,
+        data_offset,
+        grid,
+        remarks,
+    };
+    Ok((header, is_pair))
 }
 
 fn is_pair(fields: &Fields, version: u8) -> Result<bool, ImagingError> {

@@ -4,8 +4,8 @@
 
 use nalgebra::{Matrix3, Matrix3x4, Point3, Vector3};
 
-use super::fields::Fields;
 use crate::read::ReadOptions;
+use crate::read::fields::Fields;
 use crate::read::placing::{centred, letters_of, within_reason};
 use crate::{ImagingError, NotAGrid, Remark, VoxelGrid};
 
@@ -220,7 +220,8 @@ pub(super) fn grid(
         (None, Some(by_qform)) => by_qform?,
         (None, None) => without_forms(placement, unit_m, size, options, remarks)?,
     };
-    within_reason(&grid, unit_m == 1e-3, remarks)?;
+    let unit_key = (unit_m != 1e-3).then_some("xyzt_units");
+    within_reason(&grid, unit_key, remarks)?;
     let differs = grid
         .spacing_m()
         .into_iter()

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use flate2::bufread::GzDecoder;
 
@@ -20,7 +20,7 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// A file's bytes from first to last, inflated where it is compressed.
 #[derive(Debug)]
-pub(super) struct ByteStream {
+pub(in crate::read) struct ByteStream {
     source: Source,
     is_compressed: bool,
     file_bytes: u64,
@@ -35,66 +35,14 @@ enum Source {
     End(Option<&'static str>),
 }
 
-/// Header and voxels of what a path names: one file, or a pair.
-#[expect(
-    clippy::case_sensitive_file_extension_comparisons,
-    reason = "of a name in small letters"
-)]
-pub(super) fn pair(path: &Path) -> (PathBuf, PathBuf) {
-    let text = path.to_string_lossy();
-    let lower = text.to_ascii_lowercase();
-    let (stem, end) = match lower.strip_suffix(".gz") {
-        Some(stem) => (stem, ".gz"),
-        None => (lower.as_str(), ""),
-    };
-    let is_header = stem.ends_with(".hdr");
-    if !is_header && !stem.ends_with(".img") {
-        return (path.to_owned(), path.to_owned());
-    }
-    let base = &text[..stem.len() - 4];
-    let beside = |extension: &str| {
-        // The other file may be compressed where this one is not, and written in capitals.
-        let upper = extension.to_ascii_uppercase();
-        [
-            format!("{base}.{extension}{end}"),
-            format!("{base}.{extension}"),
-            format!("{base}.{extension}.gz"),
-            format!("{base}.{upper}"),
-        ]
-        .into_iter()
-        .map(PathBuf::from)
-        .find(|candidate| candidate.is_file())
-        .unwrap_or_else(|| PathBuf::from(format!("{base}.{extension}{end}")))
-    };
-    if is_header {
-        (path.to_owned(), beside("img"))
-    } else {
-        (beside("hdr"), path.to_owned())
-    }
-}
-
 impl ByteStream {
-    pub(super) fn open(path: &Path) -> Result<Self, ImagingError> {
+    pub(in crate::read) fn open(path: &Path) -> Result<Self, ImagingError> {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let unreadable = |error: std::io::Error| unreadable(error).at(name.clone());
         let file = File::open(path).map_err(unreadable)?;
         let file_bytes = file.metadata().map_err(unreadable)?.len();
         let mut reader = BufReader::with_capacity(BUFFER, file);
         let is_compressed = reader.fill_buf().map_err(unreadable)?.starts_with(&GZIP);
-        let says_so = path
-            .extension()
-            .is_some_and(|end| end.eq_ignore_ascii_case("gz"));
-        if says_so && !is_compressed && file_bytes > 0 {
-            // Read as it is: the header decides whether it makes sense.
-            let first = reader.fill_buf().map_err(unreadable)?;
-            if !super::version::begins_as_header(first) {
-                return Err(ImagingError::refused(
-                    "it is named .gz, but its first bytes are not those of gzip",
-                )
-                .at(name)
-                .hint("copy or export it again"));
-            }
-        }
         let source = if is_compressed {
             Source::Gzip(Box::new(GzDecoder::new(reader)))
         } else {
@@ -108,12 +56,21 @@ impl ByteStream {
         })
     }
 
-    pub(super) fn is_compressed(&self) -> bool {
-        self.is_compressed
+    /// How it is compressed, for people.
+    pub(in crate::read) fn compression(&self) -> Option<&'static str> {
+        self.is_compressed.then_some("gzip")
+    }
+
+    /// What comes next of a file that is not compressed: nothing at its end.
+    pub(in crate::read) fn first_as_they_are(&mut self) -> Result<Option<&[u8]>, ImagingError> {
+        match &mut self.source {
+            Source::Plain(reader) => reader.fill_buf().map(Some).map_err(unreadable),
+            _ => Ok(None),
+        }
     }
 
     /// More than this the file cannot hold, whatever is in it.
-    pub(super) fn most_bytes(&self) -> u64 {
+    pub(in crate::read) fn most_bytes(&self) -> u64 {
         if self.is_compressed {
             self.file_bytes.saturating_mul(MOST_INFLATION)
         } else {
@@ -122,7 +79,7 @@ impl ByteStream {
     }
 
     /// Fills a piece, and says how far it came: less than all only at the end of the file.
-    pub(super) fn fill(&mut self, piece: &mut [u8]) -> Result<usize, ImagingError> {
+    pub(in crate::read) fn fill(&mut self, piece: &mut [u8]) -> Result<usize, ImagingError> {
         let mut filled = 0;
         while filled < piece.len() {
             let got = self.read(&mut piece[filled..])?;
@@ -179,7 +136,7 @@ impl ByteStream {
         Ok(())
     }
 
-    pub(super) fn skip_to(&mut self, offset: u64) -> Result<(), ImagingError> {
+    pub(in crate::read) fn skip_to(&mut self, offset: u64) -> Result<(), ImagingError> {
         let mut piece = [0; 4096];
         while self.at < offset {
             let length =
@@ -192,7 +149,7 @@ impl ByteStream {
     }
 
     /// After the last voxel: reads on to the sum at the end of the gzip member, and says what is odd there.
-    pub(super) fn finish(
+    pub(in crate::read) fn finish(
         &mut self,
         piece: &mut [u8],
     ) -> Result<Option<&'static str>, ImagingError> {

@@ -2,9 +2,9 @@
 
 /// The bytes of a header.
 #[derive(Debug)]
-pub(super) struct Fields<'a> {
-    pub(super) bytes: &'a [u8],
-    pub(super) is_big_endian: bool,
+pub(crate) struct Fields<'a> {
+    pub(crate) bytes: &'a [u8],
+    pub(crate) is_big_endian: bool,
 }
 
 impl Fields<'_> {
@@ -19,27 +19,27 @@ impl Fields<'_> {
         array
     }
 
-    pub(super) fn byte(&self, at: usize) -> u8 {
+    pub(crate) fn byte(&self, at: usize) -> u8 {
         u8::from_le_bytes(self.at(at))
     }
 
-    pub(super) fn i16(&self, at: usize) -> i64 {
+    pub(crate) fn i16(&self, at: usize) -> i64 {
         i16::from_le_bytes(self.at(at)).into()
     }
 
-    pub(super) fn i32(&self, at: usize) -> i64 {
+    pub(crate) fn i32(&self, at: usize) -> i64 {
         i32::from_le_bytes(self.at(at)).into()
     }
 
-    pub(super) fn i64(&self, at: usize) -> i64 {
+    pub(crate) fn i64(&self, at: usize) -> i64 {
         i64::from_le_bytes(self.at(at))
     }
 
-    pub(super) fn f32(&self, at: usize) -> f64 {
+    pub(crate) fn f32(&self, at: usize) -> f64 {
         f32::from_le_bytes(self.at(at)).into()
     }
 
-    pub(super) fn f64(&self, at: usize) -> f64 {
+    pub(crate) fn f64(&self, at: usize) -> f64 {
         f64::from_le_bytes(self.at(at))
     }
 }
