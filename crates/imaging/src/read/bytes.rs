@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use flate2::bufread::GzDecoder;
+use flate2::bufread::{GzDecoder, ZlibDecoder};
 
 use crate::ImagingError;
 use crate::read::unreadable;
@@ -22,15 +22,24 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 #[derive(Debug)]
 pub(in crate::read) struct ByteStream {
     source: Source,
-    is_compressed: bool,
+    compression: Option<Compression>,
+    /// That are not yet read where the stream began.
     file_bytes: u64,
     at: u64,
+}
+
+/// How bytes are compressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::read) enum Compression {
+    Gzip,
+    Zlib,
 }
 
 #[derive(Debug)]
 enum Source {
     Plain(BufReader<File>),
     Gzip(Box<GzDecoder<BufReader<File>>>),
+    Zlib(Box<ZlibDecoder<BufReader<File>>>),
     /// Nothing more; what was left over, if anything.
     End(Option<&'static str>),
 }
@@ -42,23 +51,78 @@ impl ByteStream {
         let file = File::open(path).map_err(unreadable)?;
         let file_bytes = file.metadata().map_err(unreadable)?.len();
         let mut reader = BufReader::with_capacity(BUFFER, file);
-        let is_compressed = reader.fill_buf().map_err(unreadable)?.starts_with(&GZIP);
-        let source = if is_compressed {
+        let is_gzip = reader.fill_buf().map_err(unreadable)?.starts_with(&GZIP);
+        let source = if is_gzip {
             Source::Gzip(Box::new(GzDecoder::new(reader)))
         } else {
             Source::Plain(reader)
         };
         Ok(Self {
             source,
-            is_compressed,
+            compression: is_gzip.then_some(Compression::Gzip),
             file_bytes,
             at: 0,
         })
     }
 
+    /// The rest of a file from here on, which is compressed; places are counted anew.
+    pub(in crate::read) fn inflated(self, compression: Compression) -> Result<Self, ImagingError> {
+        let Source::Plain(reader) = self.source else {
+            return Err(ImagingError::refused(
+                "the voxels are compressed twice, with the file around them",
+            )
+            .hint("decompress the file with gunzip first"));
+        };
+        Ok(Self {
+            source: match compression {
+                Compression::Gzip => Source::Gzip(Box::new(GzDecoder::new(reader))),
+                Compression::Zlib => Source::Zlib(Box::new(ZlibDecoder::new(reader))),
+            },
+            compression: Some(compression),
+            file_bytes: self.file_bytes.saturating_sub(self.at),
+            at: 0,
+        })
+    }
+
+    /// Bytes from the beginning of the stream.
+    pub(in crate::read) fn at(&self) -> u64 {
+        self.at
+    }
+
+    /// Bytes that a file has which is not compressed.
+    pub(in crate::read) fn plain_bytes(&self) -> Option<u64> {
+        self.compression.is_none().then_some(self.file_bytes)
+    }
+
+    /// The next line without its end; none at the end of the file, an error for one of more than `most` bytes.
+    pub(in crate::read) fn line(&mut self, most: usize) -> Result<Option<Vec<u8>>, ImagingError> {
+        let (mut line, mut byte) = (Vec::new(), [0]);
+        loop {
+            if self.fill(&mut byte)? == 0 {
+                return Ok(Some(line).filter(|line| !line.is_empty()));
+            }
+            if byte == *b"\n" {
+                if line.last() == Some(&b'\r') {
+                    line.pop();
+                }
+                return Ok(Some(line));
+            }
+            if line.len() == most {
+                return Err(ImagingError::refused(format!(
+                    "a line of the header has more than {most} bytes: the header is damaged"
+                ))
+                .hint("copy or export it again"));
+            }
+            line.push(byte[0]);
+        }
+    }
+
     /// How it is compressed, for people.
     pub(in crate::read) fn compression(&self) -> Option<&'static str> {
-        self.is_compressed.then_some("gzip")
+        self.compression.map(|compression| match compression {
+            Compression::Gzip => "gzip",
+            Compression::Zlib => "zlib",
+        })
     }
 
     /// What comes next of a file that is not compressed: nothing at its end.
@@ -71,7 +135,7 @@ impl ByteStream {
 
     /// More than this the file cannot hold, whatever is in it.
     pub(in crate::read) fn most_bytes(&self) -> u64 {
-        if self.is_compressed {
+        if self.compression.is_some() {
             self.file_bytes.saturating_mul(MOST_INFLATION)
         } else {
             self.file_bytes
@@ -99,6 +163,7 @@ impl ByteStream {
                 Source::End(_) => return Ok(0),
                 Source::Plain(reader) => reader.read(piece),
                 Source::Gzip(decoder) => decoder.read(piece),
+                Source::Zlib(decoder) => decoder.read(piece),
             };
             match got {
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
@@ -120,18 +185,23 @@ impl ByteStream {
 
     /// Goes on to the member that follows at the end of one.
     fn next_member(&mut self) -> Result<(), ImagingError> {
-        let Source::Gzip(decoder) = std::mem::replace(&mut self.source, Source::End(None)) else {
-            return Ok(());
+        let source = std::mem::replace(&mut self.source, Source::End(None));
+        let mut reader = match source {
+            Source::Gzip(decoder) => decoder.into_inner(),
+            Source::Zlib(decoder) => decoder.into_inner(),
+            Source::Plain(_) | Source::End(_) => return Ok(()),
         };
-        let mut reader = decoder.into_inner();
+        let is_gzip = self.compression == Some(Compression::Gzip);
         let first = two_bytes(&mut reader).map_err(unreadable)?;
-        if first.starts_with(&GZIP) {
+        if is_gzip && first.starts_with(&GZIP) {
             self.source = Source::Gzip(Box::new(GzDecoder::new(reader)));
         } else if first.iter().any(|byte| *byte != 0) {
             // Zeros are the padding of tapes and blocks.
-            self.source = Source::End(Some(
-                "data after the compressed data are not gzip and are ignored",
-            ));
+            self.source = Source::End(Some(if is_gzip {
+                "data after the compressed data are not gzip and are ignored"
+            } else {
+                "data after the compressed data are ignored"
+            }));
         }
         Ok(())
     }
@@ -148,12 +218,16 @@ impl ByteStream {
         Ok(())
     }
 
-    /// After the last voxel: reads on to the sum at the end of the gzip member, and says what is odd there.
+    /// After the last voxel: reads on to the sum at the end of the compressed data, and says what is odd there.
     pub(in crate::read) fn finish(
         &mut self,
         piece: &mut [u8],
+        has_trailer: bool,
     ) -> Result<Option<&'static str>, ImagingError> {
-        if self.fill(piece)? > 0 {
+        if has_trailer {
+            // A few hundred bytes; not all of a file that goes on.
+            self.fill(piece)?;
+        } else if self.fill(piece)? > 0 {
             return Ok(Some("data after the last voxel are ignored"));
         }
         Ok(match self.source {

@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use super::format::{Format, format_of};
 use super::voxels::StoredVoxels;
-use super::{Format, ReadOptions, dicom, format_of, nifti, zeroed};
+use super::{ReadOptions, dicom, zeroed};
 use crate::{ImagingError, LabelMap, Remark, VoxelGrid};
 
 /// Distance between corners up to which two grids are the same.
@@ -19,9 +20,11 @@ pub struct ReadLabels {
     pub remarks: Vec<Remark>,
 }
 
-/// Reads a label map of the CT on `grid` from NIfTI or a DICOM segmentation.
+/// Reads a label map of the CT on `grid` from a DICOM segmentation or any format of volumes.
 ///
-/// Its voxels must be the CT's, to 0.01 mm at the corners; axes may run the other way or be in another order.
+/// Its voxels must be the CT's, to 0.01 mm at the corners; axes may run the other way or be in another order. It may
+/// have a part of the CT's voxels, as 3D Slicer crops segmentations: the others have no label. Where segments overlap,
+/// the last one counts.
 pub fn read_labels(
     path: &Path,
     grid: &VoxelGrid,
@@ -33,7 +36,7 @@ pub fn read_labels(
             let (labels, remarks) = dicom::read_segmentation(path, grid, options, cancel)?;
             Ok(ReadLabels { labels, remarks })
         }
-        Format::Nifti => of_stored(nifti::open(path, options)?, grid, options, cancel),
+        Format::Stored(open) => of_stored(open(path, options)?, grid, options, cancel),
     }
 }
 
@@ -45,36 +48,45 @@ fn of_stored(
 ) -> Result<ReadLabels, ImagingError> {
     let mut remarks = stored.header().remarks.clone();
     let own = stored.header().grid.clone();
+    let segment_names = stored.header().segments.names();
     let order = Order::between(&own, grid)?;
     let (values, of_bytes) = stored.labels(options, cancel)?;
     remarks.extend(of_bytes);
-    let labels = if order.is_same() {
+    let labels = if order.is_same(grid) {
         values
     } else {
-        order.applied(&values, grid)?
+        order.applied(&values, grid, options)?
     };
+    remarks.extend(order.part(grid));
     let mut is_used = vec![false; 1 << 16];
     for label in &labels {
         is_used[usize::from(*label)] = true;
     }
-    let names = (1..=u16::MAX)
-        .filter(|label| is_used[usize::from(*label)])
-        .map(|label| (label, format!("label {label}")));
+    let mut names = segment_names;
+    for (label, _) in &names {
+        is_used[usize::from(*label)] = false;
+    }
+    let nameless = (1..=u16::MAX).filter(|label| is_used[usize::from(*label)]);
+    names.extend(nameless.map(|label| (label, format!("label {label}"))));
+    names.sort();
     Ok(ReadLabels {
         labels: LabelMap {
             grid: grid.clone(),
             labels,
-            names: names.collect(),
+            names,
         },
         remarks,
     })
 }
 
-/// Which axis of another grid runs along each axis of ours, and whether the other way.
+/// Which axis of another grid runs along each axis of ours, whether the other way, and from which voxel on.
 #[derive(Debug, PartialEq, Eq)]
 struct Order {
+    /// Of the other grid, along its axes.
     size: [usize; 3],
     axes: [(usize, bool); 3],
+    /// The voxel of ours at which the other grid begins.
+    first: [usize; 3],
 }
 
 impl Order {
@@ -89,25 +101,27 @@ impl Order {
         ];
         let mut nearest_m = f64::INFINITY;
         for permutation in permutations {
-            if permutation.map(|axis| own.size()[axis]) != wanted.size() {
+            let size = permutation.map(|axis| own.size()[axis]);
+            if (0..3).any(|axis| size[axis] > wanted.size()[axis]) {
                 continue;
             }
             for flips in 0..8 {
-                let order = Self {
+                let mut order = Self {
                     size: own.size(),
                     axes: [0, 1, 2].map(|axis| (permutation[axis], flips >> axis & 1 == 1)),
+                    first: [0; 3],
                 };
+                order.first = order.nearest_first(own, wanted);
                 let apart_m = order.farthest_corners_m(own, wanted);
                 if apart_m <= SAME_CORNERS_M {
                     return Ok(order);
                 }
-                nearest_m = nearest_m.min(apart_m);
+                if size == wanted.size() {
+                    nearest_m = nearest_m.min(apart_m);
+                }
             }
         }
-        let [a, b] = [own, wanted].map(|grid| {
-            let [i, j, k] = grid.size();
-            format!("{i} x {j} x {k}")
-        });
+        let [a, b] = [own, wanted].map(|grid| words(grid.size()));
         let what = if nearest_m.is_finite() {
             format!(
                 "its voxel corners are up to {:.3} mm from the CT's",
@@ -122,7 +136,28 @@ impl Order {
         )
     }
 
-    /// Index in the other grid of one in ours.
+    /// Voxels of the other grid along our axes.
+    fn lengths(&self) -> [usize; 3] {
+        self.axes.map(|(axis, _)| self.size[axis])
+    }
+
+    /// The voxel of ours that is nearest to where the other grid begins, so that all of it is in ours.
+    fn nearest_first(&self, own: &VoxelGrid, wanted: &VoxelGrid) -> [usize; 3] {
+        let index = wanted.index_from_ct(&place(own, self.index([0; 3])));
+        let lengths = self.lengths();
+        [0, 1, 2].map(|axis| {
+            let most = (wanted.size()[axis] - lengths[axis]) as f64;
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "within the grid; 0 where it is not finite"
+            )]
+            let first = index[axis].round().clamp(0.0, most) as usize;
+            first
+        })
+    }
+
+    /// Index in the other grid of one in ours, counted from its first voxel there.
     fn index(&self, index: [usize; 3]) -> [usize; 3] {
         let mut other = [0; 3];
         for ((axis, is_flipped), at) in self.axes.into_iter().zip(index) {
@@ -136,35 +171,39 @@ impl Order {
     }
 
     fn farthest_corners_m(&self, own: &VoxelGrid, wanted: &VoxelGrid) -> f64 {
+        let lengths = self.lengths();
         (0..8)
             .map(|corner| {
                 let at = [0, 1, 2].map(|axis| {
                     if corner >> axis & 1 == 1 {
-                        wanted.size()[axis] - 1
+                        lengths[axis] - 1
                     } else {
                         0
                     }
                 });
-                let place = |grid: &VoxelGrid, index: [usize; 3]| {
-                    let index = index.map(|each| each as f64);
-                    grid.ct_from_index(&nalgebra::Point3::from(nalgebra::Vector3::from(index)))
-                };
-                (place(own, self.index(at)) - place(wanted, at)).norm()
+                let ours = [0, 1, 2].map(|axis| self.first[axis] + at[axis]);
+                (place(own, self.index(at)) - place(wanted, ours)).norm()
             })
             .fold(0.0, f64::max)
     }
 
-    fn is_same(&self) -> bool {
-        self.axes == [(0, false), (1, false), (2, false)]
+    fn is_same(&self, grid: &VoxelGrid) -> bool {
+        self.axes == [(0, false), (1, false), (2, false)] && self.size == grid.size()
     }
 
-    fn applied(&self, values: &[u16], grid: &VoxelGrid) -> Result<Vec<u16>, ImagingError> {
-        let mut labels = zeroed(values.len())?;
-        let [columns, rows, slices] = grid.size();
-        let mut out = labels.iter_mut();
+    fn applied(
+        &self,
+        values: &[u16],
+        grid: &VoxelGrid,
+        options: &ReadOptions,
+    ) -> Result<Vec<u16>, ImagingError> {
+        options.check_memory(grid, (grid.len() * size_of::<u16>()) as u64)?;
+        let mut labels = zeroed(grid.len())?;
+        let [columns, rows, slices] = self.lengths();
         for k in 0..slices {
             for j in 0..rows {
-                for (i, label) in (0..columns).zip(&mut out) {
+                let start = grid.offset([self.first[0], self.first[1] + j, self.first[2] + k]);
+                for (i, label) in labels[start..start + columns].iter_mut().enumerate() {
                     let [a, b, c] = self.index([i, j, k]);
                     *label = values[(c * self.size[1] + b) * self.size[0] + a];
                 }
@@ -172,4 +211,27 @@ impl Order {
         }
         Ok(labels)
     }
+
+    /// That the other grid has a part of our voxels.
+    fn part(&self, grid: &VoxelGrid) -> Option<Remark> {
+        let lengths = self.lengths();
+        (lengths != grid.size()).then(|| {
+            let [i, j, k] = self.first;
+            Remark::new(format!(
+                "it has {} of the CT's {} voxels, from voxel {i}, {j}, {k} on: the others have no label",
+                words(lengths),
+                words(grid.size())
+            ))
+        })
+    }
+}
+
+fn words([i, j, k]: [usize; 3]) -> String {
+    format!("{i} x {j} x {k}")
+}
+
+/// Of a voxel, in `ct`.
+fn place(grid: &VoxelGrid, index: [usize; 3]) -> nalgebra::Point3<f64> {
+    let index = index.map(|each| each as f64);
+    grid.ct_from_index(&nalgebra::Point3::from(nalgebra::Vector3::from(index)))
 }

@@ -1,4 +1,4 @@
-//! Volumes and label maps from NIfTI and DICOM.
+//! Volumes and label maps from DICOM, NIfTI, NRRD, MetaImage and MGH.
 //!
 //! Headers are read first: the memory that they require is checked against the file and a limit before allocation.
 //! Where a file leaves room for a guess it is refused; what is used although something about it is odd comes with a
@@ -7,22 +7,28 @@
 mod bytes;
 mod dicom;
 mod fields;
+mod foreign;
+mod format;
 mod label_names;
 mod labels;
+mod metaimage;
+mod mgh;
 mod nifti;
+mod nrrd;
 mod patient_position;
 mod placing;
 mod plausibility;
 mod scalar;
+mod segments;
+mod text_header;
 mod voxels;
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
+use self::format::{Format, format_of};
 use self::scalar::Tally;
 use self::voxels::StoredVoxels;
 use crate::{ImagingError, Orientation, Remark, Volume, VoxelGrid};
@@ -38,7 +44,7 @@ pub struct ReadOptions {
     pub series: Option<String>,
     /// Interpolate single missing slices, which are refused otherwise.
     pub fill_gaps: bool,
-    /// How the voxels of a NIfTI file run that does not say it.
+    /// How the voxels of a file run that does not say it.
     pub assume_orientation: Option<Orientation>,
     /// Most bytes that the voxels may take in memory.
     pub max_bytes: u64,
@@ -70,6 +76,9 @@ impl ReadOptions {
         .hint("crop or subsample it beforehand, or raise the limit with --max-memory"))
     }
 }
+
+/// What to do about a header that says nothing sensible.
+const DAMAGED: &str = "the header is damaged: copy or export it again";
 
 /// Rounded up, lest what is above a limit looks as if it were not.
 fn in_mib(bytes: u64) -> String {
@@ -128,7 +137,8 @@ pub struct Description {
     pub padding_voxels: u64,
 }
 
-/// Reads a CT: `.nii`, `.nii.gz`, `.hdr` with `.img`, a DICOM file, or a folder of DICOM files.
+/// Reads a CT: a DICOM file, a folder of DICOM files, NIfTI (`.nii`, `.nii.gz`, `.hdr` with `.img`), NRRD (`.nrrd`, `.nhdr`),
+/// MetaImage (`.mha`, `.mhd`), or MGH (`.mgh`, `.mgz`).
 ///
 /// The result is the same whatever the number of `threads`.
 pub fn read_volume(
@@ -139,8 +149,8 @@ pub fn read_volume(
 ) -> Result<ReadVolume, ImagingError> {
     let _stage = tracing::debug_span!("read", file = %path.display()).entered();
     let read = match format_of(path)? {
-        Format::Nifti => of_stored(nifti::open(path, options)?, options, cancel),
         Format::Dicom => dicom::read(path, options, threads, cancel),
+        Format::Stored(open) => of_stored(open(path, options)?, options, cancel),
     }?;
     let grid = &read.volume.grid;
     tracing::info!(
@@ -161,41 +171,6 @@ pub fn read_volume(
 fn unreadable(error: std::io::Error) -> ImagingError {
     ImagingError::refused(format!("cannot be read: {error}"))
         .hint("check that it exists, is complete and readable")
-}
-
-/// What a path holds, by its first bytes.
-enum Format {
-    Nifti,
-    Dicom,
-}
-
-fn format_of(path: &Path) -> Result<Format, ImagingError> {
-    if path.metadata().map_err(unreadable)?.is_dir() {
-        return Ok(Format::Dicom);
-    }
-    let mut first = Vec::new();
-    let file = File::open(path).map_err(unreadable)?;
-    file.take(dicom::FIRST_BYTES)
-        .read_to_end(&mut first)
-        .map_err(unreadable)?;
-    if first.is_empty() {
-        return Err(ImagingError::refused("the file is empty").hint("copy or export it again"));
-    }
-    // Bytes count before names: DICOM files are called .img, too.
-    if dicom::has_mark(&first) {
-        Ok(Format::Dicom)
-    } else if nifti::begins_as_header(&first) {
-        Ok(Format::Nifti)
-    } else if dicom::is_dicom(&first) {
-        Ok(Format::Dicom)
-    } else if nifti::has_name(path) {
-        Ok(Format::Nifti)
-    } else {
-        Err(
-            ImagingError::refused("its first bytes are neither NIfTI nor DICOM")
-                .hint("a CT is read from .nii, .nii.gz, .hdr with .img, a DICOM file, or a folder of DICOM files"),
-        )
-    }
 }
 
 /// The volume of a file with one.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use super::{DAMAGED, ReadOptions};
 use crate::{ImagingError, NotAGrid, Orientation, Remark, VoxelGrid};
 
 /// Distances between voxels that CT scanners have, from micro-CT to scouts.
@@ -10,13 +11,8 @@ const SPACING_M: [f64; 2] = [1e-6, 0.05];
 /// No CT is longer.
 const EXTENT_M: f64 = 5.0;
 
-/// For people.
-pub(super) fn letters_of(orientation: &Orientation) -> String {
-    orientation.to_string()
-}
-
 /// A grid whose axes run as `orientation` says, around the origin.
-pub(super) fn centred(
+fn centred(
     orientation: &Orientation,
     spacing_m: [f64; 3],
     size: [usize; 3],
@@ -61,4 +57,74 @@ pub(super) fn within_reason(
         ));
     }
     Ok(())
+}
+
+/// A grid in LPS metres: `steps` along its axes as columns and the centre of its first voxel, both in a unit of
+/// `unit_m` and in axes that become LPS by `signs`.
+pub(super) fn in_lps(
+    size: [usize; 3],
+    signs: [f64; 3],
+    steps: &Matrix3<f64>,
+    first: &Point3<f64>,
+    unit_m: f64,
+) -> Result<VoxelGrid, NotAGrid> {
+    // Rounded the same way as a plain division by 1000 where the unit is mm.
+    let scaled = |each: f64| {
+        if unit_m == 1e-3 {
+            each / 1e3
+        } else {
+            each * unit_m
+        }
+    };
+    let to_lps = Matrix3::from_diagonal(&Vector3::from(signs));
+    VoxelGrid::new(
+        size,
+        to_lps * steps.map(scaled),
+        Point3::from(to_lps * first.coords.map(scaled)),
+    )
+}
+
+/// Voxels whose header does not say how they lie in the patient.
+pub(super) struct Unplaced<'a> {
+    /// What is wrong with that.
+    pub(super) what: &'a str,
+    /// Where the header should say it.
+    pub(super) place: &'a str,
+    /// Distances between voxels, where they are known.
+    pub(super) spacing_m: Option<[f64; 3]>,
+    pub(super) size: [usize; 3],
+}
+
+/// The grid that the options assume; refused where they assume none.
+pub(super) fn unplaced(
+    voxels: &Unplaced,
+    options: &ReadOptions,
+    remarks: &mut Vec<Remark>,
+) -> Result<VoxelGrid, ImagingError> {
+    let Some(assumed) = &options.assume_orientation else {
+        return Err(ImagingError::refused(voxels.what).at(voxels.place).hint(
+            "write the affine into the header; or, if you know the voxel axes, give them, e.g. \
+             --assume-orientation LPS: columns to the patient's left, rows to posterior, slices to \
+             superior",
+        ));
+    };
+    let Some(spacing_m) = voxels.spacing_m else {
+        return Err(
+            ImagingError::refused("the distances between voxels are not stated")
+                .at(voxels.place)
+                .hint("write them into the header"),
+        );
+    };
+    remarks.push(
+        Remark::new(format!(
+            "no orientation in the header: voxel axes {assumed} assumed, with the origin at the \
+             volume's centre"
+        ))
+        .at(voxels.place),
+    );
+    centred(assumed, spacing_m, voxels.size).map_err(|problem| {
+        ImagingError::refused(problem.to_string())
+            .at(voxels.place)
+            .hint(DAMAGED)
+    })
 }

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::bytes::ByteStream;
 use super::scalar::{Converter, Rescale, Stored, Tally};
+use super::segments::{Painter, Segments};
 use super::{ReadOptions, reserved, zeroed};
 use crate::{ImagingError, Remark, VoxelGrid};
 
@@ -24,6 +25,19 @@ pub(super) struct Header {
     pub(super) grid: VoxelGrid,
     /// What is worth knowing of the header.
     pub(super) remarks: Vec<Remark>,
+    /// Whether the format has something else after the voxels.
+    pub(super) has_trailer: bool,
+    /// Of a segmentation.
+    pub(super) segments: Segments,
+}
+
+impl Header {
+    /// Bytes that the voxels have.
+    pub(super) fn wanted_bytes(&self) -> u64 {
+        (self.grid.len() as u64)
+            .saturating_mul(self.segments.layers() as u64)
+            .saturating_mul(self.stored.kind.bytes() as u64)
+    }
 }
 
 /// What a file holds, before its voxels are read.
@@ -73,6 +87,13 @@ impl StoredVoxels {
         options: &ReadOptions,
         cancel: &AtomicBool,
     ) -> Result<(Vec<i16>, Tally, Vec<Remark>), ImagingError> {
+        let layers = self.header.segments.layers();
+        if layers > 1 {
+            return Err(ImagingError::refused(format!(
+                "it is a segmentation with {layers} layers, not a CT"
+            ))
+            .hint("a segmentation completes a CT, as --labels of ct build"));
+        }
         let count = self.header.grid.len();
         self.check_size(count * size_of::<i16>(), options)?;
         let converter = Converter::new(self.header.stored, self.header.rescale, None, count);
@@ -98,7 +119,8 @@ impl StoredVoxels {
         self.check_size(count * size_of::<u16>(), options)?;
         let mut labels = reserved(count)?;
         let (stored, rescale) = (self.header.stored, self.header.rescale);
-        let remarks = self.each_piece(cancel, |bytes, _| {
+        let mut painter = self.header.segments.painter();
+        let mut remarks = self.each_piece(cancel, |bytes, _| {
             let mut wrong = None;
             stored.each(bytes, |number| {
                 let value = number * rescale.slope + rescale.intercept;
@@ -111,7 +133,11 @@ impl StoredVoxels {
                     clippy::cast_sign_loss,
                     reason = "checked above"
                 )]
-                labels.push(value as u16);
+                let label = value as u16;
+                match &mut painter {
+                    None => labels.push(label),
+                    Some(painter) => labels.extend(painter.take(label)),
+                }
             });
             match wrong {
                 None => Ok(()),
@@ -122,13 +148,17 @@ impl StoredVoxels {
                 .hint("is it the scan or a probability map instead of a label map?")),
             }
         })?;
+        remarks.extend(painter.iter().flat_map(Painter::remarks));
         Ok((labels, remarks))
     }
 
     /// Refuses what the file cannot hold, and what memory should not, before any memory is taken.
     fn check_size(&self, in_memory: usize, options: &ReadOptions) -> Result<(), ImagingError> {
         options.check_memory(&self.header.grid, in_memory as u64)?;
-        let wanted = self.header.data_offset.saturating_add(self.wanted_bytes());
+        let wanted = self
+            .header
+            .data_offset
+            .saturating_add(self.header.wanted_bytes());
         if self.stream.most_bytes() < wanted {
             let size = self.header.grid.size();
             return Err(cut_off(
@@ -147,17 +177,13 @@ impl StoredVoxels {
         Ok(())
     }
 
-    fn wanted_bytes(&self) -> u64 {
-        (self.header.grid.len() as u64).saturating_mul(self.header.stored.kind.bytes() as u64)
-    }
-
     /// Reads the voxels piece by piece: bytes, and the number of voxels that they hold.
     fn each_piece(
         &mut self,
         cancel: &AtomicBool,
         mut take: impl FnMut(&[u8], usize) -> Result<(), ImagingError>,
     ) -> Result<Vec<Remark>, ImagingError> {
-        let wanted = self.wanted_bytes();
+        let wanted = self.header.wanted_bytes();
         let voxel = self.header.stored.kind.bytes();
         self.stream.skip_to(self.header.data_offset)?;
         let mut piece = vec![0; PIECE];
@@ -181,7 +207,7 @@ impl StoredVoxels {
             take(&piece[..length], length / voxel)?;
             done += length as u64;
         }
-        let beyond = self.stream.finish(&mut piece)?;
+        let beyond = self.stream.finish(&mut piece, self.header.has_trailer)?;
         Ok(beyond.into_iter().map(Remark::new).collect())
     }
 }

@@ -12,7 +12,7 @@ use super::tag::{self, Tag};
 use crate::ImagingError;
 use crate::read::PatientPosition;
 use crate::read::scalar::{Kind, Rescale, Stored};
-use crate::structures::{SurfaceTissue, structure_of};
+use crate::read::segments::name_of;
 
 /// Kinds of objects that are images of CT: of one slice, of many, and made of many.
 const CT_IMAGES: [&str; 3] = [
@@ -451,32 +451,18 @@ fn padding(data: &DataSet, is_signed: bool) -> Option<[f64; 2]> {
     Some([one.min(other), one.max(other)])
 }
 
-/// Its label; its coded type and side where the label has no known meaning and those have.
 fn segment_name(item: &DataSet, number: u16) -> String {
     let meaning = |items: &[DataSet]| items.first()?.text(tag::CODE_MEANING);
     let types = item.items(tag::SEGMENT_TYPE);
     let modifiers = types
         .first()
         .map(|each| each.items(tag::SEGMENT_TYPE_MODIFIER));
-    let side = modifiers.and_then(meaning);
-    let coded = meaning(types).map(|name| match side {
-        Some(side) => format!("{name} {side}"),
-        None => name,
-    });
-    let label = item.text(tag::SEGMENT_LABEL);
-    let is_lesion = |name: &String| {
-        structure_of(name).is_some_and(|structure| structure.tissue == SurfaceTissue::Lesion)
-    };
-    // Lesions of one type are several: each keeps its own name, too.
-    let coded = match (coded, &label) {
-        (Some(coded), Some(label)) if is_lesion(&coded) => Some(format!("{coded} {label}")),
-        (Some(coded), None) if is_lesion(&coded) => Some(format!("{coded} {number}")),
-        (coded, _) => coded,
-    };
-    let mut names = label.iter().chain(&coded);
-    let known = names.find(|name| structure_of(name).is_some());
-    let name = known.or(label.as_ref()).or(coded.as_ref());
-    name.cloned().unwrap_or_else(|| format!("segment {number}"))
+    name_of(
+        item.text(tag::SEGMENT_LABEL).as_ref(),
+        meaning(types),
+        modifiers.and_then(meaning),
+        number.into(),
+    )
 }
 
 fn segmentation(data: &DataSet) -> Option<Segmentation> {

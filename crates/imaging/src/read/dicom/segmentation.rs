@@ -7,6 +7,7 @@ use super::find;
 use super::image::{Segmentation, Slice, named};
 use super::pixels::{self, LastFile};
 use crate::read::scalar::{Kind, Stored};
+use crate::read::segments::in_several;
 use crate::read::{ReadOptions, zeroed};
 use crate::{ImagingError, LabelMap, Remark, VoxelGrid};
 
@@ -75,9 +76,7 @@ pub(in crate::read) fn read(
         })?;
     }
     if overlapping > 0 {
-        remarks.push(Remark::new(format!(
-            "{overlapping} voxels are in several segments: the last one is used"
-        )));
+        remarks.push(in_several(overlapping));
     }
     let mut names = segmentation.segments.clone();
     names.sort();

@@ -2,14 +2,13 @@
 
 use super::orientation::{self, Placement};
 use super::version::{BYTES_1, BYTES_2, version_of};
-use crate::read::ReadOptions;
 use crate::read::bytes::ByteStream;
 use crate::read::fields::Fields;
 use crate::read::scalar::{Kind, Rescale, Stored};
+use crate::read::segments::Segments;
 use crate::read::voxels::Header;
+use crate::read::{DAMAGED, ReadOptions};
 use crate::{ImagingError, Remark};
-
-const DAMAGED: &str = "the header is damaged: copy or export it again";
 
 /// Reads it from the beginning of a stream, and whether the voxels are in a file of their own.
 pub(super) fn read(
@@ -72,6 +71,8 @@ fn parse(
         data_offset,
         grid,
         remarks,
+        has_trailer: false,
+        segments: Segments::NONE,
     };
     Ok((header, is_pair))
 }

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Matrix3x4, Point3, Vector3};
 
 use crate::read::ReadOptions;
 use crate::read::fields::Fields;
-use crate::read::placing::{centred, letters_of, within_reason};
+use crate::read::placing::{Unplaced, in_lps, unplaced, within_reason};
 use crate::{ImagingError, NotAGrid, Remark, VoxelGrid};
 
 /// Distance between places by sform and qform above which they disagree.
@@ -164,20 +164,12 @@ fn in_ct(
     unit_m: f64,
     size: [usize; 3],
 ) -> Result<VoxelGrid, NotAGrid> {
-    // Rounded the same way as a plain division by 1000 where the unit is mm.
-    let scaled = world_from_index.map(|each| {
-        if unit_m == 1e-3 {
-            each / 1e3
-        } else {
-            each * unit_m
-        }
-    });
-    let to_lps = Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0));
-    let lps = to_lps * scaled;
-    VoxelGrid::new(
+    in_lps(
         size,
-        lps.fixed_columns::<3>(0).into_owned(),
-        Point3::from(lps.column(3).into_owned()),
+        [-1.0, -1.0, 1.0],
+        &world_from_index.fixed_columns::<3>(0).into_owned(),
+        &Point3::from(world_from_index.column(3).into_owned()),
+        unit_m,
     )
 }
 
@@ -218,7 +210,16 @@ pub(super) fn grid(
             by_sform
         }
         (None, Some(by_qform)) => by_qform?,
-        (None, None) => without_forms(placement, unit_m, size, options, remarks)?,
+        (None, None) => unplaced(
+            &Unplaced {
+                what: "neither sform nor qform: left and right of the patient are unknown",
+                place: "sform_code, qform_code",
+                spacing_m: Some(placement.spacing.map(|each| each.abs() * unit_m)),
+                size,
+            },
+            options,
+            remarks,
+        )?,
     };
     let unit_key = (unit_m != 1e-3).then_some("xyzt_units");
     within_reason(&grid, unit_key, remarks)?;
@@ -265,39 +266,4 @@ fn compare(
         }
     };
     remarks.push(Remark::new(message).at("qform"));
-}
-
-/// Of a header that says nothing of place.
-fn without_forms(
-    placement: &Placement,
-    unit_m: f64,
-    size: [usize; 3],
-    options: &ReadOptions,
-    remarks: &mut Vec<Remark>,
-) -> Result<VoxelGrid, ImagingError> {
-    let Some(assumed) = &options.assume_orientation else {
-        return Err(ImagingError::refused(
-            "neither sform nor qform: left and right of the patient are unknown",
-        )
-        .at("sform_code, qform_code")
-        .hint(
-            "write the affine into the header; or, if you know the voxel axes, give them, e.g. \
-             --assume-orientation LPS: columns to the patient's left, rows to posterior, slices to \
-             superior",
-        ));
-    };
-    remarks.push(
-        Remark::new(format!(
-            "no orientation in the header: voxel axes {} assumed, with the origin at the volume's \
-             centre",
-            letters_of(assumed)
-        ))
-        .at("sform_code, qform_code"),
-    );
-    centred(
-        assumed,
-        placement.spacing.map(|each| each.abs() * unit_m),
-        size,
-    )
-    .map_err(|problem| not_a_grid(&problem, "pixdim"))
 }
