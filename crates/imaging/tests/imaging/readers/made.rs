@@ -127,6 +127,48 @@ pub fn nifti(version: u8, is_big_endian: bool) -> Vec<u8> {
     header
 }
 
+/// An MGH file of 16-bit numbers: steps of -0.5, 0.75 and 2 mm in RAS, (1, 2, 3) mm in the middle.
+pub fn mgh() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for number in [1_i32, 5, 4, 3, 1, 4, 0] {
+        bytes.extend(number.to_be_bytes());
+    }
+    bytes.extend(1_i16.to_be_bytes());
+    let numbers: [f32; 15] = [
+        0.5, 0.75, 2.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 3.0,
+    ];
+    bytes.extend(numbers.into_iter().flat_map(f32::to_be_bytes));
+    bytes.resize(284, 0);
+    for index in 0..SIZE.iter().product() {
+        bytes.extend(hu_at(index).to_be_bytes());
+    }
+    // Times of the scan, and a tag with a name.
+    bytes.extend([0; 20]);
+    bytes.extend(b"Zyxwvut");
+    bytes
+}
+
+/// A NRRD file of 8-bit numbers in two layers, with a segment in each.
+pub fn layered_nrrd() -> Vec<u8> {
+    let mut bytes = b"NRRD0004\ntype: uchar\ndimension: 4\nspace: right-anterior-superior\nsizes: 2 5 4 3\n\
+         space directions: none (-0.5,0,0) (0,0.75,0) (0,0,2)\nkinds: list domain domain domain\nencoding: raw\n\
+         space origin: (10,-20,30)\nSegment0_Name:=lung left\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n\
+         Segment1_Name:=rib\nSegment1_LabelValue:=1\nSegment1_Layer:=1\n\n"
+        .to_vec();
+    bytes.extend((0..120).map(|at| u8::from(at % 3 == 0)));
+    bytes
+}
+
+/// A MetaImage file of 16-bit numbers.
+pub fn metaimage() -> Vec<u8> {
+    let mut bytes = b"ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n\
+         CompressedData = False\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = -10 20 30\nElementSpacing = 0.5 0.75 2\n\
+         DimSize = 5 4 3\nElementType = MET_SHORT\nElementDataFile = LOCAL\n"
+        .to_vec();
+    bytes.extend((0..SIZE.iter().product()).flat_map(|index| hu_at(index).to_le_bytes()));
+    bytes
+}
+
 /// Of a slice: what tests change.
 #[derive(Debug, Clone)]
 pub struct Slice {

@@ -3,5 +3,8 @@
 mod dicom;
 mod labels;
 mod made;
+mod metaimage;
+mod mgh;
 mod mutated;
 mod nifti;
+mod nrrd;

@@ -4,7 +4,8 @@ use std::io::Write as _;
 
 use proptest::prelude::*;
 
-use super::made::{Slice, nifti, read_as};
+use super::made::{Slice, layered_nrrd, metaimage, mgh, nifti, read_as};
+use needlebench_imaging::read::{ReadOptions, read_labels};
 
 /// Changes of a file: where (as a share of its length), what, and how.
 fn changes() -> impl Strategy<Value = Vec<(f64, u8, u8)>> {
@@ -54,6 +55,20 @@ proptest! {
     fn changed_gzip_is_answered(changes in changes()) {
         let _ = read_as("a.nii.gz", &changed(packed(&nifti(1, false)), &changes));
         let _ = read_as("a.nii.gz", &packed(&changed(nifti(1, false), &changes)));
+    }
+
+    #[test]
+    fn changed_nrrd_metaimage_and_mgh_are_answered(changes in changes()) {
+        let grid = read_as("a.nii", &nifti(1, false)).unwrap().volume.grid;
+        let folder = tempfile::tempdir().unwrap();
+        for (name, bytes) in [("a.nrrd", layered_nrrd()), ("a.mha", metaimage()), ("a.mgh", mgh())] {
+            let bytes = changed(bytes, &changes);
+            let _ = read_as(name, &bytes);
+            let path = folder.path().join(name);
+            std::fs::write(&path, &bytes).unwrap();
+            let never = std::sync::atomic::AtomicBool::new(false);
+            let _ = read_labels(&path, &grid, &ReadOptions::default(), &never);
+        }
     }
 
     #[test]

@@ -1,0 +1,6 @@
+#![no_main]
+//! Any bytes as an MGH file: an answer or a refusal.
+
+mod scratch;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| scratch::read("a.mgz", bytes));
