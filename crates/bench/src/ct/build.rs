@@ -40,7 +40,7 @@ pub struct KnownMarkers {
 /// A label map from elsewhere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GivenLabels {
-    /// NIfTI or DICOM segmentation, on the voxels of the volume.
+    /// A label map or segmentation in any format that is read, on the voxels of the volume.
     pub file: PathBuf,
     /// Which label is called what, where the file does not say it.
     pub names: Vec<(u16, String)>,

@@ -56,7 +56,7 @@ marker [[markers]] with name and position_mm. With \"base_link\" or \"base\" the
 
 #[derive(Debug, Args)]
 pub(crate) struct BuildArguments {
-    /// .nii, .nii.gz, .hdr, a DICOM file, or a folder of DICOM files.
+    /// A DICOM file, a folder of DICOM files, NIfTI, NRRD, MetaImage or MGH.
     #[arg(value_name = "PATH")]
     path: PathBuf,
     /// Folder for the results.
@@ -71,7 +71,7 @@ pub(crate) struct BuildArguments {
     /// Skin entry for a lesion, mm in the scan [default: the best entry that `suggest` finds].
     #[arg(long = "entry", value_name = "NAME=X,Y,Z", value_parser = named_place, allow_hyphen_values = true)]
     entries: Vec<NamedPlace>,
-    /// Segmentation by another program, e.g. 3D Slicer or TotalSegmentator: NIfTI or DICOM segmentation.
+    /// Segmentation by another program, e.g. 3D Slicer or TotalSegmentator: .seg.nrrd, DICOM segmentation, or a label map in a format of volumes.
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
     /// Names of the labels: JSON, a 3D Slicer colour table, or lines like `1,lung_left`.

@@ -34,7 +34,7 @@ pub(crate) struct ReadArguments {
     /// Interpolate single missing slices instead of rejecting the volume.
     #[arg(long)]
     fill_gaps: bool,
-    /// Voxel axis orientation (e.g. LPS) for NIfTI files without sform or qform.
+    /// Voxel axis orientation (e.g. LPS) for files that do not state it.
     #[arg(long, value_name = "LPS")]
     assume_orientation: Option<Orientation>,
     /// Memory limit for the voxels, in MiB.
@@ -74,7 +74,7 @@ impl ReadArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArguments {
-    /// .nii, .nii.gz, .hdr, a DICOM file, or a folder of DICOM files.
+    /// A DICOM file, a folder of DICOM files, NIfTI, NRRD, MetaImage or MGH.
     #[arg(value_name = "PATH")]
     path: PathBuf,
     #[command(flatten)]
