@@ -49,9 +49,10 @@ pub(super) fn open(path: &Path, options: &ReadOptions) -> Result<StoredVoxels, I
     let mut remarks = Vec::new();
     let axes = axes::axes(&text.fields)?;
     let grid = place::grid(&text.fields, &axes, options, &mut remarks)?;
+    // Before the byte order, which text has none of.
+    let layout = Layout::of(&text.fields)?;
     let stored = kind::stored(&text.fields)?;
     let segments = segments::segments(&text.keys, &axes, &mut remarks)?;
-    let layout = Layout::of(&text.fields)?;
     let data_path = match &layout.file {
         Some(entry) => {
             let data = beside(path, entry)?;

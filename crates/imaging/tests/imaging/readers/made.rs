@@ -9,6 +9,9 @@ use needlebench_imaging::read::{ReadOptions, ReadVolume, read_volume};
 /// Of the volumes made here.
 pub const SIZE: [usize; 3] = [5, 4, 3];
 
+/// Bytes of a number in little or big endian.
+pub type BytesOf = fn(i16) -> Vec<u8>;
+
 /// Reads with one thread.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<ReadVolume, ImagingError> {
     read_volume(path, options, 1, &AtomicBool::new(false))

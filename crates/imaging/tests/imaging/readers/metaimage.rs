@@ -5,7 +5,7 @@ use std::io::Write as _;
 use nalgebra::Point3;
 use needlebench_imaging::read::ReadOptions;
 
-use super::made::{SIZE, hu_at, read, read_as, refusal, remarks};
+use super::made::{BytesOf, SIZE, hu_at, read, read_as, refusal, remarks};
 
 /// What sums of doubles leave of millimetres.
 const ROUNDING_M: f64 = 1e-12;
@@ -73,7 +73,7 @@ fn rows_of_the_matrix_are_directions_of_axes() {
 
 #[test]
 fn every_type_is_read_in_both_byte_orders() {
-    let cases: [(&str, fn(i16) -> Vec<u8>); 12] = [
+    let cases: [(&str, BytesOf); 12] = [
         ("MET_CHAR", |hu| {
             vec![i8::try_from(hu).unwrap_or(0).cast_unsigned()]
         }),

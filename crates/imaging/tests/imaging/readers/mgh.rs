@@ -5,7 +5,7 @@ use std::io::Write as _;
 use nalgebra::Point3;
 use needlebench_imaging::read::ReadOptions;
 
-use super::made::{SIZE, hu_at, mgh, read, read_as, refusal, remarks};
+use super::made::{BytesOf, SIZE, hu_at, mgh, read, read_as, refusal, remarks};
 
 /// What 32 bits leave of millimetres.
 const ROUNDING_M: f64 = 1e-9;
@@ -55,7 +55,7 @@ fn the_centre_is_that_of_half_the_size() {
 
 #[test]
 fn every_type_is_read() {
-    let cases: [(u8, fn(i16) -> Vec<u8>); 5] = [
+    let cases: [(u8, BytesOf); 5] = [
         (0, |hu| vec![u8::try_from(hu).unwrap_or(0)]),
         (1, |hu| i32::from(hu).to_be_bytes().to_vec()),
         (3, |hu| f32::from(hu).to_be_bytes().to_vec()),

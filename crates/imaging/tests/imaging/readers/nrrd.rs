@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use needlebench_imaging::read::{ReadLabels, ReadOptions, read_labels};
 use needlebench_imaging::{ImagingError, VoxelGrid};
 
-use super::made::{SIZE, hu_at, read, read_as, refusal, remarks};
+use super::made::{BytesOf, SIZE, hu_at, read, read_as, refusal, remarks};
 
 /// What sums of doubles leave of millimetres.
 const ROUNDING_M: f64 = 1e-12;
@@ -68,7 +68,7 @@ fn voxels_are_placed_by_the_space_of_the_header() {
 
 #[test]
 fn every_type_is_read_by_every_name_in_both_byte_orders() {
-    let cases: [(&[&str], fn(i16) -> Vec<u8>); 10] = [
+    let cases: [(&[&str], BytesOf); 10] = [
         (&["signed char", "int8", "int8_t"], |hu| {
             vec![i8::try_from(hu).unwrap_or(0).cast_unsigned()]
         }),
