@@ -1,4 +1,4 @@
-"""The readers of volumes against nibabel and pydicom: HU bit for bit, places to rounding, bad files answered.
+"""The readers of volumes against nibabel, pydicom, SimpleITK and pynrrd: HU bit for bit, places to rounding, bad files answered.
 
     check.py --reader target/release/dump_volume --program target/release/needlebench [--times]
 """
@@ -13,8 +13,11 @@ import time
 from pathlib import Path
 
 import dicom
+import metaimage
+import mgh
 import nibabel as nib
 import nifti
+import nrrd_files
 import numpy as np
 import SimpleITK as sitk
 from common import BIRTH_DATE, NAME, PATIENT_ID, Reader
@@ -107,6 +110,10 @@ def main() -> int:
         odd = root / "odd-nifti"
         odd.mkdir()
         print(nifti.odd(reader, odd), "odd NIfTI files answered")
+        for name, module in {"NRRD": nrrd_files, "MetaImage": metaimage, "MGH": mgh}.items():
+            folder = made / name
+            folder.mkdir()
+            print(module.check(reader, folder), name, "files answered")
         before = reader.answers
         dicom.geometries(reader, made / "dicom")
         dicom.compressed(reader, made / "dicom")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import SimpleITK as sitk
 
 AIR_HU = -1000
 # Rules of the reader: what is not measured is air.
@@ -94,7 +95,36 @@ def as_hu(
     return np.clip(np.rint(hu), -32768, 32767).astype(np.int16)
 
 
-def same(answer: Answer, hu: np.ndarray, ct_from_index_mm: np.ndarray, what: str = "") -> None:
+def typed(kind: str, shape: tuple[int, int, int] = (7, 6, 5)) -> np.ndarray:
+    """Values of a CT as far as a type holds them, air among them, by column, row, slice."""
+    hu = np.random.default_rng(11).integers(-1024, 3072, size=shape)
+    hu[: shape[0] // 2] = -1000
+    if kind[0] == "f":
+        return hu.astype(kind) + np.asarray(0.25, dtype=kind)
+    limits = np.iinfo(kind)
+    return np.clip(hu, max(limits.min, -2000), min(limits.max, 4000)).astype(kind)
+
+
+def oblique(stored: np.ndarray) -> tuple[sitk.Image, np.ndarray]:
+    """On a turned grid, and where that is in LPS mm."""
+    image = sitk.GetImageFromArray(np.ascontiguousarray(stored.T))
+    turn = sitk.Euler3DTransform()
+    turn.SetRotation(0.2, 0.3, -0.4)
+    image.SetSpacing((0.7, 0.8, 1.3))
+    image.SetOrigin((-10.5, 20.25, -333.125))
+    image.SetDirection(turn.GetMatrix())
+    # By ITK itself, voxel by voxel.
+    first = np.array(image.TransformIndexToPhysicalPoint((0, 0, 0)))
+    steps = [np.array(image.TransformIndexToPhysicalPoint(tuple(index))) - first for index in np.eye(3, dtype=int).tolist()]
+    affine = np.eye(4)
+    affine[:3, :3] = np.array(steps).T
+    affine[:3, 3] = first
+    return image, affine
+
+
+def same(
+    answer: Answer, hu: np.ndarray, ct_from_index_mm: np.ndarray, what: str = "", tolerance_mm: float = SAME_PLACE_MM
+) -> None:
     """Bit for bit in HU, and to rounding in place."""
     what = what or str(answer.path)
     assert answer.refused is None, f"{what}: {answer.said}"
@@ -105,7 +135,7 @@ def same(answer: Answer, hu: np.ndarray, ct_from_index_mm: np.ndarray, what: str
     last = np.array(hu.shape) - 1.0
     corners = np.array([[i, j, k, 1] for i in (0, last[0]) for j in (0, last[1]) for k in (0, last[2])])
     apart = np.abs((answer.ct_from_index_mm() - ct_from_index_mm) @ corners.T).max()
-    assert apart < SAME_PLACE_MM, f"{what}: corners are {apart} mm apart"
+    assert apart < tolerance_mm, f"{what}: corners are {apart} mm apart"
 
 
 def refused(answer: Answer, *words: str) -> None:

@@ -1,0 +1,41 @@
+"""MetaImage against SimpleITK, which writes and reads it with ITK."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import SimpleITK as sitk
+from common import Reader, as_hu, oblique, refused, same, typed
+
+TYPES = ["u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8"]
+
+
+def check(reader: Reader, folder: Path) -> int:
+    """All types, in one file and beside it, raw and compressed, in both byte orders, on an oblique grid."""
+    before = reader.answers
+    for kind in TYPES:
+        stored = typed(kind)
+        image, affine = oblique(stored)
+        paths = []
+        for name, compressed in [("a.mha", False), ("b.mha", True), ("c.mhd", False), ("d.mhd", True)]:
+            path = folder / f"{kind}-{name}"
+            sitk.WriteImage(image, str(path), useCompression=compressed)
+            assert (sitk.GetArrayFromImage(sitk.ReadImage(str(path))).T == stored).all()
+            paths.append(path)
+        head, _ = paths[0].read_bytes().split(b"ElementDataFile = LOCAL\n")
+        big = folder / f"{kind}-big.mha"
+        head = head.replace(b"OrderMSB = False", b"OrderMSB = True") + b"ElementDataFile = LOCAL\n"
+        big.write_bytes(head + stored.astype(">" + kind).tobytes(order="F"))
+        assert (sitk.GetArrayFromImage(sitk.ReadImage(str(big))).T == stored).all()
+        for answer in reader.read(*paths, big):
+            same(answer, as_hu(stored), affine)
+    four = folder / "four.mha"
+    image, affine = oblique(typed("i2"))
+    sitk.WriteImage(sitk.JoinSeries([image, image]), str(four))
+    refused(reader.one(four), "2 volumes", "Extract")
+    sitk.WriteImage(sitk.JoinSeries([image]), str(four))
+    same(reader.one(four), as_hu(sitk.GetArrayFromImage(image).T), affine)
+    colours = folder / "colours.mha"
+    sitk.WriteImage(sitk.Compose(image, image, image), str(colours))
+    refused(reader.one(colours), "3 numbers a voxel")
+    return reader.answers - before
