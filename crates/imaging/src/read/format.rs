@@ -100,19 +100,19 @@ pub(super) fn format_of(path: &Path) -> Result<Format, ImagingError> {
     if let Some(open) = named(path) {
         return Ok(Format::Stored(open));
     }
+    // Before pictures: a preamble of DICOM may be that of a TIFF.
+    if dicom::has_mark(&inner) {
+        return Err(ImagingError::refused("it is a gzip file of a DICOM file")
+            .hint("decompress it with gunzip"));
+    }
     let refused = match (foreign(shown, path), is_gzip) {
         (Some((what, hint)), false) => ImagingError::refused(format!("it is {what}")).hint(hint),
         (Some((what, hint)), true) => {
             ImagingError::refused(format!("it is a gzip file of {what}")).hint(hint)
         }
-        (None, true) if dicom::has_mark(&inner) => {
-            ImagingError::refused("it is a gzip file of a DICOM file")
-                .hint("decompress it with gunzip")
+        (None, true) => {
+            ImagingError::refused("it is a gzip file, but not of a format that is read").hint(READ)
         }
-        (None, true) => ImagingError::refused(
-            "it is a gzip file, but not of a format that is read",
-        )
-        .hint(READ),
         (None, false) => ImagingError::refused(
             "its first bytes are those of no format that is read: neither DICOM, NIfTI, NRRD, MetaImage nor MGH",
         )
