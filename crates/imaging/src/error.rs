@@ -43,6 +43,17 @@ impl ImagingError {
         }
     }
 
+    /// As a remark, where the rest is used nevertheless; none of an interruption.
+    pub fn remark(&self) -> Option<Remark> {
+        match self {
+            Self::Interrupted => None,
+            Self::Refused { place, message, .. } => Some(Remark {
+                place: place.clone(),
+                message: message.clone(),
+            }),
+        }
+    }
+
     /// With how to fix it.
     #[must_use]
     pub fn hint(self, hint: impl Into<String>) -> Self {

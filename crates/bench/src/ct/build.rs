@@ -20,7 +20,6 @@ use needlebench_scenario::scenario::PartTissue;
 use serde::Serialize;
 
 use super::digest::voxels_sha256;
-use super::localisation::target_covariance_m2;
 use crate::Control;
 
 /// Markers whose places are known apart from the scan.
@@ -279,7 +278,7 @@ pub(super) fn register(
         (Some(found), Some(known)) => Some(registered(found, known, &mut remarks)?),
         _ => None,
     };
-    let targets = targets(&seen.volume, &seen.made, registered.as_ref());
+    let targets = targets(&seen.made, registered.as_ref());
     Ok(ScanBuild {
         seen,
         registered,
@@ -401,16 +400,12 @@ fn with_found(error: ImagingError, found: &Found) -> ImagingError {
     }
 }
 
-fn targets(
-    volume: &Volume,
-    made: &Reconstruction,
-    registered: Option<&Registered>,
-) -> Vec<BuiltTarget> {
+fn targets(made: &Reconstruction, registered: Option<&Registered>) -> Vec<BuiltTarget> {
     let lesions = made.lesions.iter();
     lesions
         .filter_map(|measured| {
             let size = measured.size.as_ref()?;
-            let covariance = target_covariance_m2(volume, &measured.lesion);
+            let covariance = size.centroid_covariance_m2;
             Some(BuiltTarget {
                 name: measured.lesion.name.clone(),
                 center_m: size.centroid_m.coords.into(),

@@ -6,7 +6,6 @@ mod built_folder;
 mod digest;
 mod files;
 mod imaged;
-mod localisation;
 mod patient;
 mod scan_order;
 mod touched;

@@ -23,8 +23,8 @@ pub(crate) use bone::BONE_LEVEL_HU;
 pub use bone::Bone;
 pub(crate) use labels::label_facts;
 pub use labels::{FIRST_LESION, Label, LabelFacts, label_map, paint};
-pub(crate) use lesion::grow_lesion;
 pub use lesion::{Lesion, LesionSeed};
+pub(crate) use lesion::{centre_covariance_m2, grow_lesion};
 pub(crate) use lungs::LUNG_LEVEL_HU;
 pub use lungs::{Lung, Lungs, Side};
 

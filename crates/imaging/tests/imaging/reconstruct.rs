@@ -366,9 +366,15 @@ fn seeds_that_are_in_no_lesion_are_refused_by_name() {
         ([f64::NAN, 0.0, 0.0], "outside the volume"),
     ] {
         let mut options = options();
-        options.lesions = vec![seed("wrong", at_mm)];
-        let error = run(&volume, &options).err().unwrap();
-        let (place, message) = refusal(&error);
+        // One does not keep the others from being grown.
+        options.lesions = vec![seed("wrong", at_mm), seed("nodule", NODULE_MM)];
+        let made = run(&volume, &options).unwrap();
+        assert_eq!(made.lesions[0].lesion.name, "nodule");
+        let [error] = &made.not_grown[..] else {
+            panic!("{:?}", made.not_grown);
+        };
+        let (place, message) = refusal(error);
+        assert!(remarks(&made).contains(message));
         assert!(
             place.is_some_and(|place| place.contains("lesion `wrong`")),
             "{error:?}"
