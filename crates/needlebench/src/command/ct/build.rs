@@ -228,7 +228,8 @@ fn make(
     let written = write(arguments, &given.room, &built, control);
     progress.finish();
     let written = written.map_err(stopped)?;
-    let findings = refused(&written.scenario, &given, &built);
+    let mut findings = not_grown(&arguments.path, &built);
+    findings.extend(refused(&written.scenario, &given, &built));
     if arguments.json {
         let status = status_of(&findings);
         let answer = BuildAnswer {
@@ -253,6 +254,17 @@ fn make(
     } else {
         Err(findings.into())
     }
+}
+
+/// The lesions that could not be grown: all else is built and written.
+fn not_grown(scan: &Path, built: &ScanBuild) -> Vec<Finding> {
+    let errors = built.seen.made.not_grown.iter();
+    let stops = errors.map(|error| Stop::of_scan(scan, error.clone()));
+    let findings = stops.filter_map(|stop| match stop {
+        Stop::Refused(findings) => Some(findings),
+        _ => None,
+    });
+    findings.flatten().collect()
 }
 
 /// What `check` refuses of the scenario, with the options that mend it.
