@@ -306,6 +306,13 @@ pub(crate) fn completed_labels(
         map.names.push((label, lesion.name.clone()));
     }
     map.names.sort();
-    let facts = label_facts(&map);
+    let mut facts = label_facts(&map);
+    // Its lesions have labels of their own now.
+    facts.retain(|fact| {
+        let tissue = tissues[usize::from(fact.label)];
+        tissue != Some(SurfaceTissue::Lesion) || fact.voxels > 0
+    });
+    map.names
+        .retain(|(label, _)| facts.iter().any(|fact| fact.label == *label));
     (map, facts)
 }

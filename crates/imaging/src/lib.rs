@@ -16,6 +16,7 @@ mod histogram;
 mod image_circle;
 mod in_slices;
 mod label_map;
+mod mapped_lesions;
 pub mod markers;
 mod mask;
 mod morphology;

@@ -13,6 +13,7 @@ use crate::error::{ImagingError, Remark};
 use crate::field_of_view::FieldOfView;
 use crate::grid::VoxelGrid;
 use crate::label_map::{Given, complete, completed_labels, given_structures, is_solid};
+use crate::mapped_lesions::mapped_lesions;
 use crate::mask::{IndexBox, Mask};
 use crate::segment::{
     LabelFacts, Lesion, LesionSeed, Levels, Segmentation, centre_covariance_m2, check_complete,
@@ -153,7 +154,7 @@ pub struct Reconstruction {
     pub segmentation: Segmentation,
     /// Surfaces: the skin first, then by name of what they are.
     pub surfaces: Vec<Surface>,
-    /// Lesions that could be grown, in the order in which they were asked for.
+    /// Lesions of the label map, then those that could be grown, in the order in which they were asked for.
     pub lesions: Vec<MeasuredLesion>,
     /// Why the others could not, each with the name of the lesion; a remark says the same.
     pub not_grown: Vec<ImagingError>,
@@ -203,9 +204,10 @@ pub fn reconstruct(
     given.retain(|each| is_solid(each, &found, &volume.grid, &mut remarks));
     let other_bone = complete(&mut found, &given, &volume.grid, &mut remarks)?;
     progress("lesions", 0.3);
-    let mut lesions = Vec::with_capacity(options.lesions.len());
+    let mut seeds = options.lesions.clone();
+    let mut lesions = mapped_lesions(&mut given, volume, &found, &mut seeds, cancel, &mut remarks)?;
     let mut not_grown = Vec::new();
-    for seed in &options.lesions {
+    for seed in &seeds {
         match grow_lesion(volume, &found, seed, cancel, &mut remarks) {
             Ok(lesion) => lesions.push(lesion),
             Err(ImagingError::Interrupted) => return Err(ImagingError::Interrupted),
@@ -432,18 +434,18 @@ fn jobs<'a>(
             organ: organ_of(found, lesion),
             bounds: IndexBox::whole(lesion.fine.grid.size()),
             mask: &lesion.fine_mask,
-            runs: Runs::At {
-                level_hu: lesion.level_hu,
-                typical: {
-                    let inside = f32::from(lesion.median_hu);
-                    #[expect(
-                        clippy::cast_possible_truncation,
-                        reason = "half-integers of HU are exact"
-                    )]
-                    let level = lesion.level_hu as f32;
-                    [inside, 2.0 * level - inside]
-                },
-            },
+            runs: lesion.level_hu.map_or(Runs::Mask, |level_hu| {
+                let inside = f32::from(lesion.median_hu);
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "half-integers of HU are exact"
+                )]
+                let outside = 2.0 * level_hu as f32 - inside;
+                Runs::At {
+                    level_hu,
+                    typical: [inside, outside],
+                }
+            }),
             target: sizes.other,
             cell_m: SMALL_CELL_M,
             lesion: Some((number, lesion)),

@@ -35,7 +35,7 @@ pub struct BuildReport<'b> {
     pub room_sha256: String,
     /// Closed surfaces.
     pub surfaces: Vec<SurfaceReport<'b>>,
-    /// Lesions that were asked for, in that order.
+    /// Lesions of the label map, then those that were asked for, in that order.
     pub lesions: Vec<LesionReport<'b>>,
     /// Labels of `labels.nii.gz`.
     pub labels: &'b [LabelFacts],
@@ -85,8 +85,8 @@ pub struct LesionReport<'b> {
     pub in_lung: bool,
     /// Its median, HU.
     pub median_hu: i16,
-    /// Where its surface runs, HU.
-    pub level_hu: f64,
+    /// Where its surface runs, HU; none where a label map has its outline.
+    pub level_hu: Option<f64>,
     /// Whether it was cut where it meets the wall of the lung.
     pub cut_at_wall: bool,
     /// Whether it was cut where vessels leave it.

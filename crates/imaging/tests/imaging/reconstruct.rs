@@ -827,3 +827,59 @@ fn one_lobe_is_not_the_lung() {
     let share = volume(&made) / volume(&clear);
     assert!((0.95..1.1).contains(&share), "{share}");
 }
+
+/// Two nodules under one label: one of them was pointed at, and has the name of the seed.
+#[test]
+fn lesions_of_a_label_map_are_lesions_with_its_outline() {
+    const OTHER_MM: [f64; 3] = [70.0, 0.0, -20.0];
+    let mut solids = chest();
+    solids.push(Solid(ellipsoid(OTHER_MM, [NODULE_RADIUS_MM; 3]), 40.0));
+    let volume = render(&solids, grid());
+    let [nx, ny, _] = SIZE;
+    let label = |at: usize| {
+        let index = [at % nx, at / nx % ny, at / (nx * ny)].map(|each| each as f64);
+        let place = volume.grid.ct_from_index(&Point3::from(index)).coords / MM;
+        let near = |at_mm: [f64; 3]| (place - Vector3::from(at_mm)).norm() <= NODULE_RADIUS_MM;
+        u16::from(near(NODULE_MM) || near(OTHER_MM)) * 7
+    };
+    let mut options = options();
+    options.lesions = vec![seed("pointed_at", NODULE_MM)];
+    options.labels = Some(LabelMap {
+        labels: (0..volume.hu.len()).map(label).collect(),
+        grid: volume.grid.clone(),
+        names: vec![(7, "lung_nodules".to_owned())],
+    });
+    let made = run(&volume, &options).unwrap();
+    let mut names: Vec<&str> = made
+        .lesions
+        .iter()
+        .map(|each| each.lesion.name.as_str())
+        .collect();
+    names.sort_unstable();
+    assert_eq!(names, ["lung_nodules_1", "pointed_at"]);
+    assert!(remarks(&made).contains("lesions with its outlines: 2"));
+    for each in &made.lesions {
+        let size = each.size.as_ref().unwrap();
+        let at_mm = if each.lesion.name == "pointed_at" {
+            NODULE_MM
+        } else {
+            OTHER_MM
+        };
+        let error = size.centroid_m - Point3::from(at_mm) * MM;
+        assert!(error.norm() < 0.5 * MM && each.lesion.in_lung, "{error}");
+        let sigma_m = size.centroid_covariance_m2[(2, 2)].sqrt();
+        assert!((0.5 * MM..0.7 * MM).contains(&sigma_m), "{sigma_m}");
+        assert!(
+            made.labels
+                .names
+                .iter()
+                .any(|(_, name)| *name == each.lesion.name)
+        );
+    }
+    assert!(
+        made.labels
+            .names
+            .iter()
+            .all(|(_, name)| name != "lung_nodules")
+    );
+}

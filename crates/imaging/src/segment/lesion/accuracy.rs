@@ -29,17 +29,26 @@ const WHERE_CUT: f64 = 0.03;
 /// Of a lesion that could not be bounded, as a share of the radius of the largest ball in it.
 const WHERE_LEAKED: f64 = 1.0;
 
+/// Standard deviation of the centroid of an outline from a label map along each axis, as a share of what a voxel sees: its
+/// two ends are anywhere within half a voxel, 1 / sqrt(24). An assumption: how far a reader or a network is off is not in
+/// the map.
+const OF_OUTLINE: f64 = 0.204;
+
 /// Covariance of a lesion's centroid in `ct`, m^2: of the centroid of the solid on the lung's side of its wall, without its
 /// vessels.
 pub(crate) fn centre_covariance_m2(volume: &Volume, lesion: &Lesion) -> Matrix3<f64> {
     let steps = volume.grid.steps_m();
     let [column, row, slice] = volume.grid.spacing_m();
     let thickness_m = volume.slice_thickness_m.unwrap_or(slice).max(slice);
-    let own = Vector3::new(
-        OF_PIXEL * column,
-        OF_PIXEL * row,
-        OF_SLICE * (slice + thickness_m),
-    );
+    let own = if lesion.level_hu.is_some() {
+        Vector3::new(
+            OF_PIXEL * column,
+            OF_PIXEL * row,
+            OF_SLICE * (slice + thickness_m),
+        )
+    } else {
+        Vector3::new(column, row, thickness_m) * OF_OUTLINE
+    };
     let axes = Matrix3::from_columns(&[0, 1, 2].map(|axis| steps.column(axis).normalize()));
     let mut variance = axes * Matrix3::from_diagonal(&own.component_mul(&own)) * axes.transpose();
     let mut all_round = ALL_ROUND.powi(2) * OF_SPREAD.powi(2) * lesion.spread_m2.trace() / 3.0;

@@ -67,6 +67,20 @@ impl Local {
         })
     }
 
+    /// A box of a scan as a volume of its own, with no slices in between.
+    pub(super) fn own(scan: &Scan<'_>, bounds: &IndexBox) -> Result<Volume, NotAGrid> {
+        let grid = refined(&scan.volume.grid, bounds, 1)?;
+        let [nx, ny, nz] = grid.size();
+        let columns = [bounds.first[0], bounds.first[0] + nx];
+        let places = (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k)));
+        let rows = places.map(|(j, k)| scan.row(columns, bounds.first[1] + j, bounds.first[2] + k));
+        Ok(Volume {
+            hu: rows.flatten().copied().collect(),
+            grid,
+            slice_thickness_m: scan.volume.slice_thickness_m,
+        })
+    }
+
     /// The lung that a voxel of the box is in, with its wall carried on across what grows into it by a ball of a radius;
     /// none if it is in none.
     pub(super) fn lung_hull(

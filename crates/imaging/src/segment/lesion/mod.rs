@@ -3,6 +3,7 @@
 mod accuracy;
 mod grower;
 mod local;
+mod outlined;
 mod spread;
 
 use std::sync::atomic::AtomicBool;
@@ -63,9 +64,11 @@ pub struct Lesion {
     pub in_lung: bool,
     /// Its median, HU.
     pub median_hu: i16,
-    /// Where its surface is: the middle between it and what is around it. Half-integer.
-    pub level_hu: f64,
-    /// Radius of the largest ball inside it, to half a voxel, m.
+    /// Where its surface is: the middle between it and what is around it. Half-integer; none where a label map has its
+    /// outline.
+    pub level_hu: Option<f64>,
+    /// Radius of the largest ball inside it, to half a voxel, m; of the ball of its volume where a label map has its
+    /// outline.
     pub inscribed_radius_m: f64,
     /// Whether it was cut where it meets the wall of the lung.
     pub cut_at_wall: bool,
@@ -150,7 +153,7 @@ fn grow(
                     Remark::new(format!(
                         "it merges with its surroundings at {} HU: limited to a sphere of \
                          {:.0} mm; its size is unknown",
-                        lesion.level_hu,
+                        lesion.level_hu.unwrap_or_default(),
                         4e3 * lesion.inscribed_radius_m
                     ))
                     .at(place(seed)),
@@ -229,7 +232,7 @@ fn within(
         mask: local.in_scan(&grown.mask),
         in_lung: grower.in_lung,
         median_hu: grower.median_hu,
-        level_hu: grown.level_hu,
+        level_hu: Some(grown.level_hu),
         inscribed_radius_m: grown.radius_m,
         cut_at_wall: grown.cut_at_wall,
         cut_at_vessels: grown.cut_at_vessels,

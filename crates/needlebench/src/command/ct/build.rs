@@ -500,8 +500,12 @@ fn known_markers(list: &MarkerList) -> KnownMarkers {
 fn goals(arguments: &BuildArguments, built: &ScanBuild) -> Vec<GoalSection> {
     let frame = PatientFrame::of(built);
     let asked = arguments.lesions.iter().chain(&arguments.lesion_voxels);
-    let names = asked.map(|lesion| &lesion.name);
-    let seen = names.filter(|name| built.targets.iter().any(|target| target.name == **name));
+    let asked: Vec<&String> = asked.map(|lesion| &lesion.name).collect();
+    let is_built = |name: &&String| built.targets.iter().any(|target| target.name == **name);
+    // Those of the label map follow.
+    let names = built.targets.iter().map(|target| &target.name);
+    let mapped = names.filter(|name| !asked.contains(name));
+    let seen = asked.iter().copied().filter(is_built).chain(mapped);
     seen.map(|name| {
         let entry = arguments.entries.iter().find(|entry| entry.name == *name);
         let entry_mm =
