@@ -1,7 +1,8 @@
 //! Whether the stated errors of a lesion's centre are true: against simulated nodules.
 //!
 //! The true centre is the centroid of the nodule's solid on the lung's side of the wall, without the vessels that lead to
-//! it. The shares in `segment/lesion/accuracy.rs` are from the seeds from 2000 of [`usual`]; no test here draws these.
+//! it. The shares in `segment/lesion/accuracy.rs` are from the seeds from 2000 to 2260 and from 7000 to 7300
+//! of [`usual`]; no test here draws these.
 
 mod simulator;
 
@@ -190,7 +191,7 @@ fn judge(all: &[Outcome]) {
 #[test]
 #[ignore = "two minutes in release mode"]
 fn three_hundred_true_centres_are_as_near_as_stated() {
-    judge(&outcomes(&usual(), 7000..7300));
+    judge(&outcomes(&usual(), 11_000..11_300));
 }
 
 #[test]
