@@ -262,7 +262,7 @@ fn not_grown(scan: &Path, built: &ScanBuild) -> Vec<Finding> {
     let stops = errors.map(|error| Stop::of_scan(scan, error.clone()));
     let findings = stops.filter_map(|stop| match stop {
         Stop::Refused(findings) => Some(findings),
-        _ => None,
+        Stop::Interrupted => None,
     });
     findings.flatten().collect()
 }
