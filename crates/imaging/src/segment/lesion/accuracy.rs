@@ -23,8 +23,12 @@ const OF_PIXEL: f64 = 0.012;
 /// The same across slices, as a share of the sum of slice spacing and slice thickness.
 const OF_SLICE: f64 = 0.008;
 
-/// Standard deviation along any axis where something was cut off, as a share of a pixel.
+/// Standard deviation along any axis where something was cut off, as a share of a pixel; so many times as large as the lesion
+/// is fainter than the vessel, of which as much more is left at its edge.
 const WHERE_CUT: f64 = 0.03;
+
+/// Contrast of a vessel to the lung, HU.
+const OF_VESSEL_HU: f64 = 890.0;
 
 /// Of a lesion that could not be bounded, as a share of the radius of the largest ball in it.
 const WHERE_LEAKED: f64 = 1.0;
@@ -53,7 +57,10 @@ pub(crate) fn centre_covariance_m2(volume: &Volume, lesion: &Lesion) -> Matrix3<
     let mut variance = axes * Matrix3::from_diagonal(&own.component_mul(&own)) * axes.transpose();
     let mut all_round = ALL_ROUND.powi(2) * OF_SPREAD.powi(2) * lesion.spread_m2.trace() / 3.0;
     if lesion.cut_at_wall || lesion.cut_at_vessels {
-        all_round += (WHERE_CUT * column.max(row)).powi(2);
+        let level_hu = lesion.level_hu.filter(|_| lesion.in_lung);
+        let contrast = level_hu.map(|level_hu| 2.0 * (f64::from(lesion.median_hu) - level_hu));
+        let fainter = contrast.map_or(1.0, |contrast| (OF_VESSEL_HU / contrast).max(1.0));
+        all_round += (WHERE_CUT * fainter * column.max(row)).powi(2);
     }
     if lesion.leaked {
         all_round += (WHERE_LEAKED * lesion.inscribed_radius_m).powi(2);

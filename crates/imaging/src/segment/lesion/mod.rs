@@ -144,9 +144,24 @@ fn grow(
 ) -> Result<Lesion, ImagingError> {
     let voxel = voxel_of(scan, found, seed)?;
     let mut reaches = REACHES_M.into_iter().peekable();
+    let mut refused = None;
     loop {
         let reach_m = reaches.next().unwrap_or(REACHES_M[0]);
-        let (lesion, goes_on) = within(scan, found, seed, voxel, reach_m)?;
+        let (lesion, goes_on) = match within(scan, found, seed, voxel, reach_m) {
+            Ok(lesion) => lesion,
+            Err(ImagingError::Interrupted) => return Err(ImagingError::Interrupted),
+            Err(error) => {
+                // A mass that fills the box has nothing around it there.
+                let first = refused.get_or_insert(error);
+                if reaches.peek().is_some() {
+                    continue;
+                }
+                return Err(first.clone());
+            }
+        };
+        if let Some(error) = refused.take_if(|_| lesion.leaked || !lesion.in_lung) {
+            return Err(error);
+        }
         if !goes_on || reaches.peek().is_none() {
             if lesion.leaked {
                 remarks.push(

@@ -169,6 +169,12 @@ impl Case {
         !self.vessels.is_empty()
     }
 
+    /// From the curved wall to the seed, mm.
+    pub fn seed_depth_mm(&self) -> f64 {
+        let centre = Vector3::new(self.half_mm.x - self.wall_radius_mm, 0.0, 0.0);
+        self.wall_radius_mm - (self.seed_mm - centre).norm()
+    }
+
     pub fn is_ground_glass(&self) -> bool {
         self.nodule_hu < -300.0
     }
