@@ -152,7 +152,7 @@ pub struct Reconstruction {
     pub facts: Vec<LabelFacts>,
     /// Masks of body, lungs, airways, vessels and bone.
     pub segmentation: Segmentation,
-    /// Surfaces: the skin first, then by name of what they are.
+    /// Surfaces: the skin first, what lies beside the body last.
     pub surfaces: Vec<Surface>,
     /// Lesions of the label map, then those that could be grown, in the order in which they were asked for.
     pub lesions: Vec<MeasuredLesion>,
@@ -452,7 +452,11 @@ fn jobs<'a>(
             fine: Some(&lesion.fine),
         });
     }
-    jobs.sort_by_key(|job| job.tissue != SurfaceTissue::Skin);
+    jobs.sort_by_key(|job| match job.tissue {
+        SurfaceTissue::Skin => 0,
+        SurfaceTissue::Beside => 2,
+        _ => 1,
+    });
     jobs
 }
 

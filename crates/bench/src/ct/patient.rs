@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
-use needlebench_imaging::SurfaceTissue;
+use needlebench_geometry::mesh::extent_m;
 use needlebench_imaging::registration::ReferenceFrame;
+use needlebench_imaging::{BesideKind, Remark, Surface, SurfaceTissue};
 use needlebench_kinematics::Pose;
 use needlebench_phantom::Tissue;
 use needlebench_scenario::ResolvedScenario;
@@ -33,7 +34,7 @@ impl PatientFrame {
     /// Of what was built.
     pub fn of(build: &ScanBuild) -> Self {
         let origin = build.seen.made.skin().map_or_else(Vector3::zeros, |skin| {
-            let [low, high] = needlebench_geometry::mesh::extent_m(&skin.mesh);
+            let [low, high] = extent_m(&skin.mesh);
             nalgebra::center(&low, &high).coords
         });
         Self {
@@ -173,7 +174,9 @@ fn phantom(
         }
     }
     let position_mm = frame.in_mm(&Point3::origin());
+    let is_left_out = couch_left_out(room, build).is_some();
     let surfaces = build.seen.made.surfaces.iter();
+    let surfaces = surfaces.filter(|surface| !(is_left_out && is_under(surface)));
     let parts = surfaces.map(|surface| PartSection {
         name: surface.name.clone(),
         file: format!("{SURFACES}/{}.stl", surface.name),
@@ -210,6 +213,33 @@ fn phantom(
             ..own
         },
     }
+}
+
+/// Whether something beside the patient stays where it is when the patient is turned.
+fn is_under(surface: &Surface) -> bool {
+    surface.tissue == SurfaceTissue::Beside && surface.name != BesideKind::Arms.name()
+}
+
+/// Says that the patient of the room lies otherwise than on the couch of the scan, which is left out then.
+pub(crate) fn couch_left_out(room: &Room<'_>, build: &ScanBuild) -> Option<Remark> {
+    let made = &build.seen.made;
+    let couch = BesideKind::Couch.name();
+    let couch = made.surfaces.iter().find(|each| each.name == couch)?;
+    let middle = |surface: &Surface| {
+        let [low, high] = extent_m(&surface.mesh);
+        nalgebra::center(&low, &high)
+    };
+    let placed = room.resolved.phantom.as_ref();
+    let down = placed.map_or(Vector3::y(), |placed| {
+        placed.world_from_phantom.rotation.inverse() * -Vector3::z()
+    });
+    let below_m = (middle(couch) - middle(made.skin()?)).dot(&down);
+    (below_m <= 0.0).then(|| {
+        Remark::new(
+            "the couch of the scan is not under the patient as the room has them lie: couch and objects are left out \
+             of the scenario; routes keep clear of both",
+        )
+    })
 }
 
 /// Where the scan ends, as the patient has it.

@@ -18,7 +18,7 @@ use super::files::{
     BuildDigests, BuildFiles, BuildReport, LABELS_FILE, LabelNames, NAMES_FILE, REPORT_FILE,
     ROUTES_FILE, SCENARIO_FILE, SESSION_FILE, SLICES, VOLUME_FILE, surface_file,
 };
-use super::patient::{Room, SURFACES, patient_scenario};
+use super::patient::{Room, SURFACES, couch_left_out, patient_scenario};
 use crate::{Control, Stop};
 
 /// A patient whose folder was written.
@@ -30,6 +30,8 @@ pub struct WrittenPatient<'b> {
     pub report: BuildReport<'b>,
     /// What was made of a former build of the folder.
     pub set_aside: Option<SetAside>,
+    /// What of the scan the scenario does not have, and why.
+    pub left_out: Option<Remark>,
 }
 
 /// What was made of a former build, and is used no longer.
@@ -108,6 +110,7 @@ pub fn write_patient<'b>(
         scenario,
         report,
         set_aside,
+        left_out: couch_left_out(room, build),
     })
 }
 

@@ -38,8 +38,8 @@ const ARM_SOFT_HU: i16 = -200;
 /// Share of an arm that is denser than that.
 const ARM_SOFT_SHARE: f64 = 0.7;
 
-/// A couch is at least so wide, m,
-const COUCH_WIDTH_M: f64 = 0.15;
+/// A couch is at least so wide on each side of where a back parts it, m (assumed): no rail is,
+const COUCH_WIDTH_M: f64 = 0.06;
 
 /// and goes through at least this share of the slices.
 const COUCH_SHARE: f64 = 0.8;

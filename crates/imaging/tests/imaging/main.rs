@@ -1,5 +1,6 @@
 //! CT volumes, from outside the crate.
 
+mod beside;
 mod names;
 mod nodules;
 mod readers;

@@ -282,6 +282,50 @@ fn depth_and_lungs_are_those_of_the_shapes() {
 }
 
 #[test]
+fn what_lies_beside_the_body_is_in_the_way_and_no_skin() {
+    let ray = Ray {
+        target: Point3::from(TARGET),
+        outwards: Vector3::x_axis(),
+    };
+    let skin_m = CENTRE[0] + 0.07;
+    let bare = chest(false);
+    let needlebench_routing::Exit::Skin(depth_m) = anatomy(&bare, 1).exit(&ray) else {
+        panic!("no skin");
+    };
+    // From how far off the skin on, and how thick, m: on the skin it is one voxel thin.
+    for (off_m, thick_m, name) in [
+        (0.01, 0.01, "arms"),
+        (0.0, SPACING_M[0], "couch"),
+        (0.004, 0.003, "objects"),
+    ] {
+        let mut labels = chest(false);
+        let slab_m = skin_m + off_m..skin_m + off_m + thick_m;
+        let [nx, ny, nz] = labels.grid.size();
+        for (k, j) in (0..nz).flat_map(|k| (0..ny).map(move |j| (k, j))) {
+            for i in 0..nx {
+                let place = Point3::new(i as f64, j as f64, k as f64);
+                let at = labels.grid.ct_from_index(&place);
+                let offset = labels.grid.offset([i, j, k]);
+                if slab_m.contains(&at.x) && labels.labels[offset] == 0 {
+                    labels.labels[offset] = 77;
+                }
+            }
+        }
+        labels.names.push((77, name.to_owned()));
+        let anatomy = anatomy(&labels, 1);
+        assert_eq!(anatomy.exit(&ray), needlebench_routing::Exit::Skin(depth_m));
+        assert!(
+            anatomy.is_body_between(&ray, [depth_m, depth_m + 0.05]),
+            "{name}"
+        );
+        assert!(anatomy.skin_normal(&ray, depth_m).dot(&Vector3::x_axis()) > 0.98);
+        if off_m > 0.0 {
+            assert!(!anatomy.is_body_between(&ray, [depth_m, depth_m + off_m - 2e-3]));
+        }
+    }
+}
+
+#[test]
 fn nothing_goes_through_a_marker_on_the_skin() {
     let labels = chest(false);
     let direction = Vector3::x_axis();
