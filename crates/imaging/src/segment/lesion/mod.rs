@@ -8,7 +8,7 @@ mod spread;
 
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::{Matrix3, Point3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::error::{ImagingError, Remark};
 use crate::grid::NotAGrid;
@@ -163,6 +163,7 @@ fn grow(
             return Err(error);
         }
         if !goes_on || reaches.peek().is_none() {
+            check_at_seed(scan, &lesion, seed)?;
             if lesion.leaked {
                 remarks.push(
                     Remark::new(format!(
@@ -177,6 +178,34 @@ fn grow(
             return Ok(lesion);
         }
     }
+}
+
+/// Farthest that a lesion may begin from the point that a person set in it, m (assumed): where a wall or vessels are cut off,
+/// what is left may be something else along the wall.
+const FARTHEST_FROM_SEED_M: f64 = 5e-3;
+
+/// Refuses a lesion that is not where the point is.
+fn check_at_seed(scan: &Scan<'_>, lesion: &Lesion, seed: &LesionSeed) -> Result<(), ImagingError> {
+    let grid = &scan.volume.grid;
+    let from_seed_m = lesion.mask.voxels().map(|voxel| {
+        let voxel = [0, 1, 2].map(|axis| (voxel[axis] + lesion.bounds.first[axis]) as f64);
+        let apart_m = grid.ct_from_index(&Point3::from(voxel)) - seed.point_m;
+        // To the voxel's nearer side, along each axis of the patient.
+        let half_m = Vector3::from(scan.spacing_m) * 0.5;
+        apart_m
+            .abs()
+            .zip_map(&half_m, |apart_m, half_m| (apart_m - half_m).max(0.0))
+            .norm()
+    });
+    let nearest_m = from_seed_m.fold(f64::INFINITY, f64::min);
+    if nearest_m <= FARTHEST_FROM_SEED_M {
+        return Ok(());
+    }
+    Err(ImagingError::refused(format!(
+        "what is left of it without wall and vessels begins {:.1} mm from the point",
+        1e3 * nearest_m
+    ))
+    .hint("set the point at the centre of the lesion, or use a label map for its outline"))
 }
 
 /// A lesion of a box within the smallest hull of a lung that has its seed, and the radius of the ball that made the hull.

@@ -192,7 +192,7 @@ fn whole(
             "lesion {} {} HU, level {} HU, inscribed {:.2} mm, wall {} vessels {} leaked {} {:?}",
             lesion.name,
             lesion.median_hu,
-            lesion.level_hu,
+            lesion.level_hu.unwrap_or_default(),
             1e3 * lesion.inscribed_radius_m,
             lesion.cut_at_wall,
             lesion.cut_at_vessels,
