@@ -120,6 +120,7 @@ impl Surfaces {
     pub fn add_tissue(&mut self, part: &PhantomPart, place: &Pose) {
         let (group, opacity) = match part.tissue {
             Tissue::Skin => ("skin", 0.22),
+            Tissue::Beside => ("skin", 0.5),
             Tissue::Organ => ("organ", 0.4),
             Tissue::Bone => ("bone", 1.0),
             Tissue::Fissure => ("organ", 0.5),

@@ -47,7 +47,7 @@ pub(crate) fn mapped_lesions(
                 own.clone()
             };
             let mask = parts.mask_of(|other| other == at);
-            let place = seeds.iter().position(|seed| {
+            let is_in_it = |seed: &LesionSeed| {
                 let voxel = volume
                     .grid
                     .voxel_at(&volume.grid.index_from_ct(&seed.point_m));
@@ -55,10 +55,11 @@ pub(crate) fn mapped_lesions(
                     each.bounds.contains(voxel)
                         && mask.get([0, 1, 2].map(|axis| voxel[axis] - each.bounds.first[axis]))
                 })
-            });
-            if let Some(place) = place {
-                name = seeds.remove(place).name;
+            };
+            if let Some(first) = seeds.iter().find(|seed| is_in_it(seed)) {
+                name.clone_from(&first.name);
             }
+            seeds.retain(|seed| !is_in_it(seed));
             let is_taken = |name: &str| {
                 seeds.iter().any(|seed| seed.name == name)
                     || lesions.iter().any(|lesion| lesion.name == name)

@@ -81,6 +81,8 @@ pub enum Tissue {
     Lesion,
     /// A registration marker on the skin.
     Marker,
+    /// Beside the body in the scan that it is from: an arm, the couch.
+    Beside,
 }
 
 impl fmt::Display for Tissue {
@@ -93,6 +95,7 @@ impl fmt::Display for Tissue {
             Self::Fissure => "fissure",
             Self::Lesion => "lesion",
             Self::Marker => "marker",
+            Self::Beside => "beside",
         })
     }
 }

@@ -193,6 +193,18 @@ fn phantom(
     });
     let parts = parts.collect();
     let cuts = cuts(build, frame);
+    let mut own = own;
+    let arms = BesideKind::Arms.name();
+    if build
+        .seen
+        .made
+        .surfaces
+        .iter()
+        .any(|each| each.name == arms)
+    {
+        // The patient's own.
+        own.arms = needlebench_scenario::scenario::Arms::None;
+    }
     match model {
         Some(_) => PhantomSection {
             markers: None,
@@ -222,6 +234,17 @@ fn is_under(surface: &Surface) -> bool {
 
 /// Says that the patient of the room lies otherwise than on the couch of the scan, which is left out then.
 pub(crate) fn couch_left_out(room: &Room<'_>, build: &ScanBuild) -> Option<Remark> {
+    /// How far the room may have the patient turned about what they lie on in the scan: cos 30 deg.
+    const LIES_ALIKE: f64 = 0.866;
+    let robot = ReferenceFrame::Robot;
+    if build
+        .registered
+        .as_ref()
+        .is_some_and(|it| it.registration.frame == robot)
+    {
+        // The markers say how the patient lies, whatever the room does.
+        return None;
+    }
     let made = &build.seen.made;
     let couch = BesideKind::Couch.name();
     let couch = made.surfaces.iter().find(|each| each.name == couch)?;
@@ -233,11 +256,12 @@ pub(crate) fn couch_left_out(room: &Room<'_>, build: &ScanBuild) -> Option<Remar
     let down = placed.map_or(Vector3::y(), |placed| {
         placed.world_from_phantom.rotation.inverse() * -Vector3::z()
     });
-    let below_m = (middle(couch) - middle(made.skin()?)).dot(&down);
-    (below_m <= 0.0).then(|| {
+    // The couch is as long as the scan: along the patient its middle says nothing.
+    let mut to_couch = middle(couch) - middle(made.skin()?);
+    to_couch.z = 0.0;
+    (to_couch.normalize().dot(&down) < LIES_ALIKE).then(|| {
         Remark::new(
-            "the couch of the scan is not under the patient as the room has them lie: couch and objects are left out \
-             of the scenario; routes keep clear of both",
+            "the couch of the scan is not under the patient as the room has them lie: couch and objects are left out",
         )
     })
 }

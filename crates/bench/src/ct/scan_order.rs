@@ -48,7 +48,7 @@ impl<'p> CtSubject<'p> {
         Some(Self {
             name: name_of(file),
             phantom: &placed.phantom,
-            limbs: &placed.limbs,
+            limbs: placed.modelled_limbs(),
             down: world_from_phantom.inverse_transform_vector(&-Vector3::z()),
             robot_from_phantom: Some(robot_from_world * world_from_phantom),
         })

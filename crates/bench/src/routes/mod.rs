@@ -20,6 +20,7 @@ mod report;
 
 use std::sync::Arc;
 
+use needlebench_imaging::BesideKind;
 use needlebench_imaging::ImagingError;
 use needlebench_input::Finding;
 use needlebench_parallel::in_parallel;
@@ -142,10 +143,18 @@ impl RouteTask<'_> {
         let target = GoalPlacer::new(self.resolved).target(self.section)?;
         let rules = self.route_rules();
         let placed = self.resolved.phantom.as_ref();
+        let scenario = &self.resolved.scenario;
+        // What the scenario does not have is not there: a couch that the patient does not lie on.
+        let parts = scenario.phantom.iter().flat_map(|phantom| &phantom.parts);
+        let parts: Vec<&str> = parts.map(|part| part.name.as_str()).collect();
+        let beside = BesideKind::ALL.iter().map(|kind| kind.name());
+        let missing = beside.filter(|name| !parts.contains(name));
+        let mut off = scenario.planning.needle_route.off.clone();
+        off.extend(missing.map(str::to_owned));
         let options = VoxelOptions {
             patient: placed.map(|placed| &placed.phantom),
             lesions: &built.lesions(),
-            off: &self.resolved.scenario.planning.needle_route.off,
+            off: &off,
             needle_m: rules.longest_m,
             markers: &built.markers(),
             outside_m: rules.outside_m,

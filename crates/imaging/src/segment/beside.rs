@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use crate::components::{Component, Components, Connectivity};
 use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
-use crate::morphology::{bridged, dilated};
+use crate::morphology::dilated;
 use crate::spacing::whole;
 
 use super::Scan;
@@ -19,6 +19,9 @@ const SKIN_VOXELS: f64 = 1.5;
 
 /// Foam is as light as air: what lies between the upper and the lower side of a shell counts as it, up to so much, m.
 const SHELL_GAP_M: f64 = 0.08;
+
+/// Holes in a shell that blur makes are closed across the patient up to so much, m.
+const SHELL_HOLE_M: f64 = 0.01;
 
 /// Smaller things beside the body are left out: markers, folds of cloth, voxels of the skin's own blur, l.
 const LEAST_L: f64 = 1e-3;
@@ -37,6 +40,9 @@ const ARM_SOFT_HU: i16 = -200;
 
 /// Share of an arm that is denser than that.
 const ARM_SOFT_SHARE: f64 = 0.7;
+
+/// Of an arm no more than this is bone; rails and frames are metal.
+const ARM_MOST_BONE_SHARE: f64 = 0.5;
 
 /// A couch is at least so wide on each side of where a back parts it, m (assumed): no rail is,
 const COUCH_WIDTH_M: f64 = 0.06;
@@ -101,11 +107,14 @@ pub(super) fn find(
     let is_arm = |part: usize| is_arm(scan, &parts.parts()[part], &densities[part]);
     let arms = parts.mask_of(is_arm);
     // Only shells of the others are dense: each is what lies between its upper and its lower side.
-    let posterior = scan.volume.grid.steps_m().row(1).transpose().iamax();
+    let [left, posterior] = [scan.axis_along(0), scan.axis_along(1)];
     let gap = scan.voxels_across(SHELL_GAP_M, posterior);
-    let mut others = bridged(&parts.mask_of(|part| !is_arm(part)), posterior, gap);
-    others.subtract(&arms);
-    others.subtract(&body.mask);
+    let mut others = parts.mask_of(|part| !is_arm(part));
+    whole_skin.unite(&arms);
+    whole_skin.unite(&body.mask);
+    bridge(&mut others, posterior, gap, &whole_skin);
+    let hole = scan.voxels_across(SHELL_HOLE_M, left);
+    bridge(&mut others, left, hole, &whole_skin);
     scan.check()?;
     let parts = Components::of(&others, Connectivity::Faces);
     let least = scan.voxels_of(LEAST_L);
@@ -132,6 +141,34 @@ pub(super) fn find(
     Ok(found)
 }
 
+/// Fills gaps of at most so many voxels along an axis, unless something else is in them.
+fn bridge(mask: &mut Mask, axis: usize, most: usize, other: &Mask) {
+    let Some(bounds) = mask.bounds() else {
+        return;
+    };
+    let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+    for at_a in bounds.first[a]..=bounds.last[a] {
+        for at_b in bounds.first[b]..=bounds.last[b] {
+            let mut voxel = [0; 3];
+            (voxel[a], voxel[b]) = (at_a, at_b);
+            let mut last = None;
+            for at in bounds.first[axis]..=bounds.last[axis] {
+                voxel[axis] = at;
+                if mask.get(voxel) {
+                    let from = last.map_or(at, |last: usize| last + 1);
+                    for between in if at - from <= most { from..at } else { at..at } {
+                        voxel[axis] = between;
+                        mask.insert(voxel);
+                    }
+                    last = Some(at);
+                } else if other.get(voxel) {
+                    last = None;
+                }
+            }
+        }
+    }
+}
+
 /// Voxels of a part by their density.
 #[derive(Debug, Clone, Copy, Default)]
 struct Density {
@@ -153,16 +190,16 @@ fn densities(scan: &Scan<'_>, parts: &Components) -> Vec<Density> {
 fn is_arm(scan: &Scan<'_>, part: &Component, density: &Density) -> bool {
     let share = |voxels: usize| voxels as f64 / part.voxels as f64;
     scan.litres(density.bone) >= ARM_BONE_L
-        && share(density.bone) >= ARM_BONE_SHARE
+        && (ARM_BONE_SHARE..=ARM_MOST_BONE_SHARE).contains(&share(density.bone))
         && share(density.soft) >= ARM_SOFT_SHARE
 }
 
 /// What something is that is no arm.
 fn kind(scan: &Scan<'_>, part: &Component) -> BesideKind {
-    let left = scan.volume.grid.steps_m().row(0).transpose().iamax();
+    let [left, up] = [scan.axis_along(0), scan.axis_along(2)];
     let size = part.bounds.size();
     let is_couch = size[left] as f64 * scan.spacing_m[left] >= COUCH_WIDTH_M
-        && size[2] as f64 >= COUCH_SHARE * scan.size()[2] as f64;
+        && size[up] as f64 >= COUCH_SHARE * scan.size()[up] as f64;
     if is_couch {
         BesideKind::Couch
     } else {

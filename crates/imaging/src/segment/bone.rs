@@ -183,7 +183,7 @@ fn is_between(scan: &Scan<'_>, lungs: &Lungs, part: &Component) -> bool {
     let within = |axis: usize| {
         (bounds.first[axis] as f64..=bounds.last[axis] as f64).contains(&middle[axis])
     };
-    let posterior = scan.volume.grid.steps_m().row(1).transpose().iamax();
+    let posterior = scan.axis_along(1);
     let depth =
         (middle[posterior] - bounds.first[posterior] as f64) / (bounds.size()[posterior] as f64);
     let runs_back = scan.volume.grid.steps_m()[(1, posterior)] > 0.0;

@@ -286,7 +286,7 @@ fn sides(
     remarks: &mut Vec<Remark>,
 ) -> Result<Vec<(Side, Mask)>, ImagingError> {
     let pieces = Components::of(air, Connectivity::Faces);
-    let axis = left_axis(scan);
+    let axis = scan.axis_along(0);
     let middle = body.centroid[axis] - body.bounds.first[axis] as f64;
     let mut left = Mask::empty(air.size());
     let mut right = Mask::empty(air.size());
@@ -318,12 +318,6 @@ fn sides(
         }
     }
     Ok(vec![(Side::Left, left), (Side::Right, right)])
-}
-
-/// The axis of the grid that runs most along x.
-fn left_axis(scan: &Scan<'_>) -> usize {
-    let x = scan.volume.grid.steps_m().row(0).transpose();
-    x.iamax()
 }
 
 /// Whether an axis of the grid runs to the patient's left.

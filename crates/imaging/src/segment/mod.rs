@@ -150,6 +150,12 @@ impl Scan<'_> {
         self.volume.grid.size()
     }
 
+    /// The axis of the grid that runs most along one of the patient's: 0 left, 1 posterior, 2 superior.
+    fn axis_along(&self, of_patient: usize) -> usize {
+        let steps_m = self.volume.grid.steps_m();
+        steps_m.row(of_patient).transpose().iamax()
+    }
+
     fn voxel_m3(&self) -> f64 {
         self.spacing_m.iter().product()
     }

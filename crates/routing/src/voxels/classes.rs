@@ -129,7 +129,12 @@ impl Classes {
         if lesions.iter().any(|lesion| lesion == name) {
             return Class::new(name, Kind::Lesion);
         }
-        if off.iter().any(|each| each == name) {
+        let is_off = off.iter().any(|each| each == name);
+        let tissue = structure_of(name).map(|structure| structure.tissue);
+        if is_off && tissue == Some(SurfaceTissue::Beside) {
+            return Class::new(name, Kind::Outside);
+        }
+        if is_off {
             return Class::new(name, Kind::Soft);
         }
         let is_bulla = ["bulla", "emphysema"]

@@ -21,6 +21,9 @@ use crate::ImagingError;
 /// What a file begins with, before the digit of its version.
 const MAGIC: &[u8] = b"NRRD000";
 
+/// Longest line before the voxels that is skipped where the header says so, bytes.
+const LONGEST_SKIPPED: usize = 1 << 20;
+
 /// Whether bytes begin as a header.
 pub(super) fn begins_as_header(first: &[u8]) -> bool {
     first.starts_with(MAGIC)
@@ -63,7 +66,7 @@ pub(super) fn open(path: &Path, options: &ReadOptions) -> Result<StoredVoxels, I
     };
     let is_gzip_file = layout.file.is_some() && stream.plain_bytes().is_none();
     for _ in 0..layout.lines {
-        if stream.line(usize::MAX)?.is_none() {
+        if stream.line(LONGEST_SKIPPED)?.is_none() {
             break;
         }
     }

@@ -186,16 +186,14 @@ const FARTHEST_FROM_SEED_M: f64 = 5e-3;
 
 /// Refuses a lesion that is not where the point is.
 fn check_at_seed(scan: &Scan<'_>, lesion: &Lesion, seed: &LesionSeed) -> Result<(), ImagingError> {
-    let grid = &scan.volume.grid;
+    let at = scan.volume.grid.index_from_ct(&seed.point_m);
+    // To the voxel's nearer side.
     let from_seed_m = lesion.mask.voxels().map(|voxel| {
-        let voxel = [0, 1, 2].map(|axis| (voxel[axis] + lesion.bounds.first[axis]) as f64);
-        let apart_m = grid.ct_from_index(&Point3::from(voxel)) - seed.point_m;
-        // To the voxel's nearer side, along each axis of the patient.
-        let half_m = Vector3::from(scan.spacing_m) * 0.5;
-        apart_m
-            .abs()
-            .zip_map(&half_m, |apart_m, half_m| (apart_m - half_m).max(0.0))
-            .norm()
+        let apart_m = [0, 1, 2].map(|axis| {
+            let apart = (voxel[axis] + lesion.bounds.first[axis]) as f64 - at[axis];
+            (apart.abs() - 0.5).max(0.0) * scan.spacing_m[axis]
+        });
+        Vector3::from(apart_m).norm()
     });
     let nearest_m = from_seed_m.fold(f64::INFINITY, f64::min);
     if nearest_m <= FARTHEST_FROM_SEED_M {

@@ -25,7 +25,12 @@ pub struct PlacedPhantom {
 impl PlacedPhantom {
     /// How many of [`Self::outside`] are the chest, head and arms; what a scan shows beside the body follows.
     pub(crate) fn modelled(&self) -> usize {
-        1 + self.limbs.len() - self.phantom.beside.len()
+        1 + self.modelled_limbs().len()
+    }
+
+    /// Head and arms without what a scan shows beside the body.
+    pub fn modelled_limbs(&self) -> &[PhantomPart] {
+        &self.limbs[..self.limbs.len() - self.phantom.beside.len()]
     }
 
     /// What of the patient can be touched, in the world: the skin of the chest, then head and arms.

@@ -67,7 +67,7 @@ impl Standing<'_> {
         let known = &mut all[beside as usize];
         let place = Placement::new(&placed.world_from_phantom);
         let left_m = |gap: &Gap| {
-            let travel_m = if placed.limbs.is_empty() {
+            let travel_m = if placed.modelled() == 1 {
                 unplaced.travel_m(&gap.place, &place)
             } else if gap.place.rotation == place.rotation {
                 (gap.place.translation - place.translation).norm()
@@ -82,11 +82,8 @@ impl Standing<'_> {
         }
         let limbs: Vec<(PreparedShape, Solid)> = placed
             .outside()
-            .take(match beside {
-                Beside::Base | Beside::Mount => usize::MAX,
-                // The couch of a scan lies where the room has its table.
-                _ => placed.modelled(),
-            })
+            // The couch of a scan lies where the room has its table.
+            .take(placed.modelled())
             .skip(1)
             .map(|limb| (PreparedShape::new(&limb.shape), limb))
             .collect();

@@ -19,7 +19,8 @@ use read::{PartMesh, read_part};
 
 fn tissue_of(tissue: PartTissue) -> Tissue {
     match tissue {
-        PartTissue::Skin | PartTissue::Beside => Tissue::Skin,
+        PartTissue::Skin => Tissue::Skin,
+        PartTissue::Beside => Tissue::Beside,
         PartTissue::Bone => Tissue::Bone,
         PartTissue::Vessel => Tissue::Vessel,
         PartTissue::Organ | PartTissue::Lung => Tissue::Organ,
@@ -253,7 +254,7 @@ fn part_of(
         triangles: mesh.surface.triangles.clone(),
     };
     let is_skin = section.tissue == PartTissue::Skin;
-    if is_skin {
+    if is_skin || section.tissue == PartTissue::Beside {
         // What engines collide with.
         check_thickness(&about_middle.vertices_m).map_err(|why| {
             toml.finding(
