@@ -10,8 +10,8 @@ use super::Lesion;
 ///
 /// Measured, as are all numbers here, on 560 simulated nodules of 6 to 30 mm and -600 to +60 HU in slices of 1, 2.5 and
 /// 5 mm, with up to 3 vessels of 2 to 5 mm and a wall at 30 % of them (`tests/imaging/nodules`, seeds from 2000 and from
-/// 7000; 300 more, from 11000, for ground glass). The ways differ less from each other than from the truth, above all at a
-/// wall, where each of them loses a part of the cap.
+/// 7000; 300 more, from 11000, for ground glass). The ways differ less from each other than from the ground truth, above
+/// all at a wall, where each of them loses a part of the cap.
 const OF_SPREAD: f64 = 1.7;
 
 /// Share of the spread, as the mean of the three axes, that is in any direction: a few ways do not span space.
