@@ -122,6 +122,23 @@ def oblique(stored: np.ndarray) -> tuple[sitk.Image, np.ndarray]:
     return image, affine
 
 
+def by_itk(folder: Path, kind: str, attached: str, detached: str) -> tuple[list[Path], np.ndarray, np.ndarray]:
+    """Files of ITK with voxels of a type on an oblique grid: attached and detached, raw and compressed.
+
+    With them the voxels and their places, which ITK itself reads back.
+    """
+    stored = typed(kind)
+    image, affine = oblique(stored)
+    paths = []
+    for end in (attached, detached):
+        for name, compressed in [("raw", False), ("compressed", True)]:
+            path = folder / f"{kind}-{name}.{end}"
+            sitk.WriteImage(image, str(path), useCompression=compressed)
+            assert (sitk.GetArrayFromImage(sitk.ReadImage(str(path))).T == stored).all()
+            paths.append(path)
+    return paths, stored, affine
+
+
 def same(
     answer: Answer, hu: np.ndarray, ct_from_index_mm: np.ndarray, what: str = "", tolerance_mm: float = SAME_PLACE_MM
 ) -> None:

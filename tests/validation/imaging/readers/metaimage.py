@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import SimpleITK as sitk
-from common import Reader, as_hu, oblique, refused, same, typed
+from common import Reader, as_hu, by_itk, oblique, refused, same, typed
 
 TYPES = ["u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8"]
 
@@ -14,14 +14,7 @@ def check(reader: Reader, folder: Path) -> int:
     """All types, in one file and beside it, raw and compressed, in both byte orders, on an oblique grid."""
     before = reader.answers
     for kind in TYPES:
-        stored = typed(kind)
-        image, affine = oblique(stored)
-        paths = []
-        for name, compressed in [("a.mha", False), ("b.mha", True), ("c.mhd", False), ("d.mhd", True)]:
-            path = folder / f"{kind}-{name}"
-            sitk.WriteImage(image, str(path), useCompression=compressed)
-            assert (sitk.GetArrayFromImage(sitk.ReadImage(str(path))).T == stored).all()
-            paths.append(path)
+        paths, stored, affine = by_itk(folder, kind, "mha", "mhd")
         head, _ = paths[0].read_bytes().split(b"ElementDataFile = LOCAL\n")
         big = folder / f"{kind}-big.mha"
         head = head.replace(b"OrderMSB = False", b"OrderMSB = True") + b"ElementDataFile = LOCAL\n"

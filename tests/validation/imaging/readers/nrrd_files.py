@@ -6,8 +6,7 @@ from pathlib import Path
 
 import nrrd
 import numpy as np
-import SimpleITK as sitk
-from common import Reader, as_hu, oblique, refused, same, typed
+from common import Reader, as_hu, by_itk, refused, same, typed
 
 TYPES = ["u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8"]
 SPACES = {
@@ -17,17 +16,10 @@ SPACES = {
 }
 
 
-def by_itk(reader: Reader, folder: Path) -> None:
+def written_by_itk(reader: Reader, folder: Path) -> None:
     """All types, attached and detached, raw and compressed, on an oblique grid."""
     for kind in TYPES:
-        stored = typed(kind)
-        image, affine = oblique(stored)
-        paths = []
-        for name, compressed in [("a.nrrd", False), ("b.nrrd", True), ("c.nhdr", False), ("d.nhdr", True)]:
-            path = folder / f"{kind}-{name}"
-            sitk.WriteImage(image, str(path), useCompression=compressed)
-            assert (sitk.GetArrayFromImage(sitk.ReadImage(str(path))).T == stored).all()
-            paths.append(path)
+        paths, stored, affine = by_itk(folder, kind, "nrrd", "nhdr")
         for answer in reader.read(*paths):
             same(answer, as_hu(stored), affine)
 
@@ -70,6 +62,6 @@ def by_pynrrd(reader: Reader, folder: Path) -> None:
 
 def check(reader: Reader, folder: Path) -> int:
     before = reader.answers
-    by_itk(reader, folder)
+    written_by_itk(reader, folder)
     by_pynrrd(reader, folder)
     return reader.answers - before
