@@ -234,6 +234,7 @@ pub(crate) fn complete(
     other.subtract(&not_bone);
     found.bone.bone.clone_from(&other);
     found.bone.bone.unite(&mapped);
+    found.bone.blurred.subtract(&not_bone);
     if mapped.is_empty() {
         return Ok(None);
     }
@@ -248,6 +249,11 @@ pub(crate) fn complete(
     say(&near, &|volume| {
         format!("it lacks {volume} of the bone found in the volume, which stay bone")
     });
+    // With what is blurred around it: the surface is looked for in it.
+    let mut blurred = dilated(&near, SAME_BONE_M, spacing_m);
+    blurred.intersect(&found.bone.blurred);
+    blurred.subtract(&mapped);
+    near.unite(&blurred);
     Ok(Some(near).filter(|bone| !bone.is_empty()))
 }
 

@@ -16,8 +16,8 @@ use crate::label_map::{Given, complete, completed_labels, given_structures, is_s
 use crate::mapped_lesions::mapped_lesions;
 use crate::mask::{IndexBox, Mask};
 use crate::segment::{
-    LabelFacts, Lesion, LesionSeed, Levels, Segmentation, centre_covariance_m2, check_complete,
-    grow_lesion, label_map, segment,
+    Label, LabelFacts, Lesion, LesionSeed, Levels, SOFT_FROM_HU, Segmentation,
+    centre_covariance_m2, check_complete, grow_lesion, label_map, segment,
 };
 use crate::spacing::{orthogonal, whole};
 use crate::structures::SurfaceTissue;
@@ -87,9 +87,6 @@ const AIR: f32 = -1000.0;
 const LUNG: f32 = -850.0;
 const SOFT: f32 = 40.0;
 const DENSE: f32 = 800.0;
-
-/// What is around bone and counts for its level: soft tissue, not lung.
-const SOFT_FROM_HU: i16 = -200;
 
 /// A closed surface.
 #[derive(Debug, Clone)]
@@ -286,7 +283,7 @@ fn jobs<'a>(
         // What a label map has comes from it.
         let is_given = given.iter().any(|each| {
             each.structure.name == name
-                || tissue == SurfaceTissue::Bone && each.structure.tissue == tissue
+                || name == Label::Bone.name() && each.structure.tissue == SurfaceTissue::Bone
         });
         if !is_given && !mask.is_empty() {
             jobs.push(Job {
@@ -351,7 +348,7 @@ fn jobs<'a>(
         "bone",
         SurfaceTissue::Bone,
         bone.bounds,
-        &bone.bone,
+        &bone.blurred,
         Runs::BoneMiddle,
         sizes.bone,
         BONE_CELL_M,

@@ -5,13 +5,17 @@ use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::closed;
 use crate::spacing::whole;
+use crate::surface::{local_level, refine};
 
-use super::Scan;
 use super::body::Body;
 use super::lungs::Lungs;
+use super::{Scan, blood};
 
 /// Denser than soft tissue and blood without contrast medium.
 pub(crate) const BONE_LEVEL_HU: f64 = 190.5;
+
+/// What is around bone and counts for its level: soft tissue, not lung.
+pub(crate) const SOFT_FROM_HU: i16 = -200;
 
 /// What is bone has some voxels that are denser than this: hysteresis against noise.
 const SURE_HU: i16 = 280;
@@ -44,6 +48,9 @@ const ON_SKIN_SHARE: f64 = 0.2;
 /// A part that is not surely bone or contrast medium and is worth a remark.
 const UNSURE_L: f64 = 1e-3;
 
+/// Of the depth of the lungs' box: in front of its back quarter, where the spine is.
+pub(super) const IN_FRONT: [f64; 2] = [0.1, 0.75];
+
 /// Bone and what is as dense. Masks are of the box.
 #[derive(Debug, Clone)]
 pub struct Bone {
@@ -51,6 +58,8 @@ pub struct Bone {
     pub bounds: IndexBox,
     /// Bone with its marrow.
     pub bone: Mask,
+    /// The same with what is blurred around it: all above the level. Its surface is looked for in it.
+    pub blurred: Mask,
     /// Blood with contrast medium: dense, but nowhere as dense as cortical bone.
     pub contrast: Mask,
 }
@@ -62,7 +71,10 @@ pub(super) fn find(
     remarks: &mut Vec<Remark>,
 ) -> Result<Bone, ImagingError> {
     let bounds = body.bounds;
-    let dense = scan.denser(&body.mask.cropped(&bounds), &bounds, scan.levels.bone_hu);
+    let mut dense = scan.denser(&body.mask.cropped(&bounds), &bounds, scan.levels.bone_hu);
+    scan.check()?;
+    let pools = blood::find(scan, body, lungs, &dense, &bounds)?;
+    dense.subtract(&pools);
     scan.check()?;
     let parts = Components::of(&dense, Connectivity::Faces);
     let facts = densities(scan, &parts, &bounds);
@@ -80,7 +92,7 @@ pub(super) fn find(
             } else if facts.cortical as f64 >= CORTICAL_SHARE * part.voxels as f64 {
                 Kind::Bone
             } else if part.voxels >= scan.voxels_of(LEAST_CONTRAST_L)
-                && is_between(scan, lungs, part)
+                && is_between(scan, body, lungs, part, IN_FRONT)
             {
                 Kind::Contrast
             } else {
@@ -88,11 +100,24 @@ pub(super) fn find(
             }
         })
         .collect();
-    note_unsure(scan, &parts, &kinds, remarks);
+    note_unsure(scan, &parts, &kinds, &pools, remarks);
     let of_kind = |wanted: &[Kind]| parts.mask_of(|part| wanted.contains(&kinds[part]));
-    let bone = solid(scan, &of_kind(&[Kind::Bone, Kind::Unsure]))?;
+    let mut blurred = solid(scan, &of_kind(&[Kind::Bone, Kind::Unsure]))?;
+    blurred.subtract(&pools);
+    scan.check()?;
+    let (hu, grid) = (&scan.volume.hu, &scan.volume.grid);
+    let levels = local_level(hu, grid, &blurred, &bounds, |hu| hu > SOFT_FROM_HU);
+    let bone = levels.map_or_else(
+        || blurred.clone(),
+        |levels| {
+            let mut bone = refine(hu, grid, &blurred, &bounds, &levels);
+            bone.intersect(&blurred);
+            bone
+        },
+    );
     let mut contrast = of_kind(&[Kind::Contrast]);
-    contrast.subtract(&bone);
+    contrast.subtract(&blurred);
+    contrast.unite(&pools);
     if bone.is_empty() {
         remarks.push(Remark::new(format!(
             "no bone found: nothing in the body is denser than {SURE_HU} HU"
@@ -101,6 +126,7 @@ pub(super) fn find(
     Ok(Bone {
         bounds,
         bone,
+        blurred,
         contrast,
     })
 }
@@ -170,15 +196,26 @@ fn near_outside(scan: &Scan<'_>, parts: &Components, body: &Body) -> Vec<usize> 
 }
 
 /// Whether a part lies between the lungs, where heart and great vessels are: its middle within the box of both, and
-/// in front of their back quarter, where the spine is.
-fn is_between(scan: &Scan<'_>, lungs: &Lungs, part: &Component) -> bool {
-    let mut both = Mask::empty(lungs.gas.size());
-    for lung in &lungs.lungs {
-        both.unite(&lung.mask);
-    }
-    let Some(bounds) = both.bounds() else {
+/// between two shares of its depth.
+pub(super) fn is_between(
+    scan: &Scan<'_>,
+    body: &Body,
+    lungs: &Lungs,
+    part: &Component,
+    shares: [f64; 2],
+) -> bool {
+    let Some(mut bounds) = lungs.around() else {
         return false;
     };
+    if lungs.lungs.len() == 1 {
+        // The other half of the chest is as wide.
+        let across = scan.axis_along(0);
+        let far = 2.0 * (body.centroid[across] - body.bounds.first[across] as f64);
+        let mirrored = |index: usize| whole((far - index as f64).max(0.0));
+        let [first, last] = [bounds.first[across], bounds.last[across]];
+        bounds.first[across] = first.min(mirrored(last));
+        bounds.last[across] = last.max(mirrored(first));
+    }
     let middle = part.centroid();
     let within = |axis: usize| {
         (bounds.first[axis] as f64..=bounds.last[axis] as f64).contains(&middle[axis])
@@ -188,10 +225,16 @@ fn is_between(scan: &Scan<'_>, lungs: &Lungs, part: &Component) -> bool {
         (middle[posterior] - bounds.first[posterior] as f64) / (bounds.size()[posterior] as f64);
     let runs_back = scan.volume.grid.steps_m()[(1, posterior)] > 0.0;
     let depth = if runs_back { depth } else { 1.0 - depth };
-    (0..3).all(within) && (0.1..0.75).contains(&depth)
+    (0..3).all(within) && (shares[0]..shares[1]).contains(&depth)
 }
 
-fn note_unsure(scan: &Scan<'_>, parts: &Components, kinds: &[Kind], remarks: &mut Vec<Remark>) {
+fn note_unsure(
+    scan: &Scan<'_>,
+    parts: &Components,
+    kinds: &[Kind],
+    pools: &Mask,
+    remarks: &mut Vec<Remark>,
+) {
     let sum = |wanted: Kind| {
         let of_kind = parts
             .parts()
@@ -200,12 +243,11 @@ fn note_unsure(scan: &Scan<'_>, parts: &Components, kinds: &[Kind], remarks: &mu
             .filter(|(_, kind)| **kind == wanted);
         scan.litres(of_kind.map(|(part, _)| part.voxels).sum())
     };
-    let contrast_l = sum(Kind::Contrast);
+    let contrast_l = sum(Kind::Contrast) + scan.litres(pools.count());
     if contrast_l > UNSURE_L {
         remarks.push(Remark::new(format!(
-            "{:.0} ml between the lungs have the density of contrast-enhanced blood (above \
-             {BONE_LEVEL_HU} HU, below {CORTICAL_HU}): classified as vessels, assumed from location \
-             and density",
+            "{:.0} ml have the density of contrast-enhanced blood (above {BONE_LEVEL_HU} HU): classified as vessels by \
+             their place between the lungs, their thickness, and surroundings that are less dense",
             1e3 * contrast_l
         )));
     }

@@ -85,6 +85,14 @@ pub struct Lungs {
     pub air_hu: Option<i16>,
 }
 
+impl Lungs {
+    /// The least box around the lungs, as indices of the masks; none without lungs.
+    pub(super) fn around(&self) -> Option<IndexBox> {
+        let boxes = self.lungs.iter().filter_map(|lung| lung.mask.bounds());
+        boxes.reduce(|a, b| a.joined(&b))
+    }
+}
+
 pub(super) fn find(
     scan: &Scan<'_>,
     body: &Body,
@@ -384,7 +392,7 @@ fn split(
 }
 
 /// Grows two masks within a third one, a layer at a time in turn, until all that they reach is theirs.
-fn grow_back(scan: &Scan<'_>, halves: &mut [Mask; 2], within: &Mask) {
+pub(super) fn grow_back(scan: &Scan<'_>, halves: &mut [Mask; 2], within: &Mask) {
     let layer_m = 1.01 * scan.spacing_m.iter().copied().fold(0.0, f64::max);
     loop {
         let mut grew = false;

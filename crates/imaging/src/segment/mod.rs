@@ -1,6 +1,7 @@
 //! Tissues of a CT volume of the chest, by Hounsfield units and shape, without learning.
 
 mod beside;
+mod blood;
 mod body;
 mod bone;
 mod labels;
@@ -19,8 +20,8 @@ use crate::volume::Volume;
 pub use beside::{Beside, BesideKind};
 pub use body::Body;
 pub(crate) use body::SKIN_LEVEL_HU;
-pub(crate) use bone::BONE_LEVEL_HU;
 pub use bone::Bone;
+pub(crate) use bone::{BONE_LEVEL_HU, SOFT_FROM_HU};
 pub(crate) use labels::label_facts;
 pub use labels::{FIRST_LESION, Label, LabelFacts, label_map, paint};
 pub use lesion::{Lesion, LesionSeed};

@@ -1,6 +1,7 @@
 //! CT volumes, from outside the crate.
 
 mod beside;
+mod contents;
 mod names;
 mod nodules;
 mod readers;
