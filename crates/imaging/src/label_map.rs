@@ -235,6 +235,12 @@ pub(crate) fn complete(
     found.bone.bone.clone_from(&other);
     found.bone.bone.unite(&mapped);
     found.bone.blurred.subtract(&not_bone);
+    let cartilage = union_of(&|structure| structure.name == Label::Cartilage.name());
+    if !cartilage.is_empty() {
+        found.bone.cartilage = Mask::empty(cartilage.size());
+    }
+    found.bone.cartilage.subtract(&mapped);
+    found.bone.cartilage.subtract(&not_bone);
     if mapped.is_empty() {
         return Ok(None);
     }
@@ -291,6 +297,7 @@ pub(crate) fn completed_labels(
         Label::LungVessels,
         Label::Bone,
         Label::ContrastVessels,
+        Label::Cartilage,
     ]
     .map(|label| label as u16);
     for (label, own) in map.labels.iter_mut().zip(&own.labels) {

@@ -87,6 +87,7 @@ const AIR: f32 = -1000.0;
 const LUNG: f32 = -850.0;
 const SOFT: f32 = 40.0;
 const DENSE: f32 = 800.0;
+const CARTILAGE: f32 = 110.0;
 
 /// A closed surface.
 #[derive(Debug, Clone)]
@@ -363,6 +364,18 @@ fn jobs<'a>(
         bone.bounds,
         &bone.contrast,
         contrast,
+        sizes.other,
+        SMALL_CELL_M,
+    );
+    add(
+        "costal_cartilages",
+        SurfaceTissue::Bone,
+        bone.bounds,
+        &bone.cartilage,
+        Runs::At {
+            level_hu: bone.cartilage_level_hu,
+            typical: [CARTILAGE, SOFT],
+        },
         sizes.other,
         SMALL_CELL_M,
     );

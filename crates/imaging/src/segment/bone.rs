@@ -9,7 +9,7 @@ use crate::surface::{local_level, refine};
 
 use super::body::Body;
 use super::lungs::Lungs;
-use super::{Scan, blood};
+use super::{Scan, blood, cartilage};
 
 /// Denser than soft tissue and blood without contrast medium.
 pub(crate) const BONE_LEVEL_HU: f64 = 190.5;
@@ -62,6 +62,10 @@ pub struct Bone {
     pub blurred: Mask,
     /// Blood with contrast medium: dense, but nowhere as dense as cortical bone.
     pub contrast: Mask,
+    /// Costal cartilage.
+    pub cartilage: Mask,
+    /// Between muscle and cartilage, HU.
+    pub cartilage_level_hu: f64,
 }
 
 pub(super) fn find(
@@ -123,11 +127,17 @@ pub(super) fn find(
             "no bone found: nothing in the body is denser than {SURE_HU} HU"
         )));
     }
+    let mut hard = blurred.clone();
+    hard.unite(&contrast);
+    let (cartilage, cartilage_level_hu) =
+        cartilage::find(scan, body, lungs, &hard, &bounds, remarks)?;
     Ok(Bone {
         bounds,
         bone,
         blurred,
         contrast,
+        cartilage,
+        cartilage_level_hu,
     })
 }
 

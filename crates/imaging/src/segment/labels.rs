@@ -34,6 +34,8 @@ pub enum Label {
     Couch = 10,
     /// Anything else beside the body.
     Objects = 11,
+    /// Costal cartilage.
+    Cartilage = 12,
 }
 
 /// Label of the first lesion; the others follow in their order.
@@ -41,7 +43,7 @@ pub const FIRST_LESION: u16 = 100;
 
 impl Label {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::SoftTissue,
         Self::LungLeft,
         Self::LungRight,
@@ -53,6 +55,7 @@ impl Label {
         Self::Arms,
         Self::Couch,
         Self::Objects,
+        Self::Cartilage,
     ];
 
     /// Its name in label maps and reports.
@@ -69,6 +72,7 @@ impl Label {
             Self::Arms => BesideKind::Arms.name(),
             Self::Couch => BesideKind::Couch.name(),
             Self::Objects => BesideKind::Objects.name(),
+            Self::Cartilage => "costal_cartilages",
         }
     }
 }
@@ -125,6 +129,7 @@ pub fn label_map(
             &found.lungs.vessels,
             Label::LungVessels,
         ),
+        (&found.bone.bounds, &found.bone.cartilage, Label::Cartilage),
         (&found.bone.bounds, &found.bone.bone, Label::Bone),
         (
             &found.bone.bounds,

@@ -4,6 +4,7 @@ mod beside;
 mod blood;
 mod body;
 mod bone;
+mod cartilage;
 mod labels;
 mod lesion;
 mod lungs;

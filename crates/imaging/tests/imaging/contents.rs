@@ -1,7 +1,7 @@
-//! Blood with contrast medium in a chest of analytic solids.
+//! Blood with contrast medium and cartilage in a chest of analytic solids.
 
 use nalgebra::Point3;
-use needlebench_imaging::{Label, Reconstruction};
+use needlebench_imaging::{Label, Reconstruction, SurfaceTissue};
 
 use super::reconstruct::{MM, Solid, chest, grid, options, render, run};
 
@@ -87,4 +87,60 @@ fn dense_marrow_in_its_shell_is_bone() {
         assert_eq!(ml(&made, Label::ContrastVessels), 0.0, "{hu} HU");
         assert_eq!(label_at(&made, [0.0, 66.0, 0.0]), Label::Bone as u16);
     }
+}
+
+/// A sternum, and a cartilage from it to the end of a rib on either side, in the wall in front of the lungs.
+fn sternum_and_cartilages(hu: f64) -> Vec<Solid> {
+    // Along an ellipse in the wall.
+    let along = |x: f64| -84.0 * (1.0 - (x / 134.0).powi(2)).sqrt();
+    let mut solids = vec![Solid(
+        Box::new(|p| p.x.abs() < 16.0 && (-88.0..-78.0).contains(&p.y) && p.z.abs() < 70.0),
+        500.0,
+    )];
+    for z in [-40.0, 0.0, 40.0] {
+        let near = move |p: &nalgebra::Vector3<f64>| {
+            libm::hypot(p.y - along(p.x.abs().min(133.0)), p.z - z) <= 7.0
+        };
+        solids.push(Solid(
+            Box::new(move |p| (14.0..75.0).contains(&p.x.abs()) && near(p)),
+            hu,
+        ));
+        solids.push(Solid(
+            Box::new(move |p| (75.0..110.0).contains(&p.x.abs()) && near(p)),
+            600.0,
+        ));
+    }
+    solids
+}
+
+#[test]
+fn costal_cartilage_is_found_between_rib_and_sternum() {
+    let mut solids = chest();
+    solids.extend(sternum_and_cartilages(105.0));
+    let made = run(&render(&solids, grid()), &options()).unwrap();
+    let at = |x: f64, z: f64| [x, -84.0 * (1.0 - (x / 134.0).powi(2)).sqrt(), z];
+    for z in [-40.0, 0.0, 40.0] {
+        for x in [-60.0, -35.0, 35.0, 60.0] {
+            assert_eq!(
+                label_at(&made, at(x, z)),
+                Label::Cartilage as u16,
+                "{x} {z}"
+            );
+        }
+        assert_eq!(label_at(&made, at(90.0, z)), Label::Bone as u16);
+    }
+    // Between two of them is muscle.
+    assert_eq!(label_at(&made, at(45.0, 20.0)), Label::SoftTissue as u16);
+    let surface = made
+        .surfaces
+        .iter()
+        .find(|surface| surface.name == "costal_cartilages");
+    assert_eq!(surface.unwrap().tissue, SurfaceTissue::Bone);
+    assert!(!said(&made, "hardly any costal cartilage"));
+    // As dense as muscle it is not seen, which is said.
+    let mut solids = chest();
+    solids.extend(sternum_and_cartilages(45.0));
+    let made = run(&render(&solids, grid()), &options()).unwrap();
+    assert_eq!(ml(&made, Label::Cartilage), 0.0);
+    assert!(said(&made, "hardly any costal cartilage"));
 }
