@@ -298,6 +298,7 @@ pub(crate) fn completed_labels(
         Label::Bone,
         Label::ContrastVessels,
         Label::Cartilage,
+        Label::NoLung,
     ]
     .map(|label| label as u16);
     for (label, own) in map.labels.iter_mut().zip(&own.labels) {

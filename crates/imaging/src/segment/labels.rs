@@ -36,6 +36,8 @@ pub enum Label {
     Objects = 11,
     /// Costal cartilage.
     Cartilage = 12,
+    /// Air in the place of the lungs that has no lung around it: bullae, emphysema, a pneumothorax.
+    NoLung = 13,
 }
 
 /// Label of the first lesion; the others follow in their order.
@@ -43,7 +45,7 @@ pub const FIRST_LESION: u16 = 100;
 
 impl Label {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::SoftTissue,
         Self::LungLeft,
         Self::LungRight,
@@ -56,6 +58,7 @@ impl Label {
         Self::Couch,
         Self::Objects,
         Self::Cartilage,
+        Self::NoLung,
     ];
 
     /// Its name in label maps and reports.
@@ -73,6 +76,7 @@ impl Label {
             Self::Couch => BesideKind::Couch.name(),
             Self::Objects => BesideKind::Objects.name(),
             Self::Cartilage => "costal_cartilages",
+            Self::NoLung => "air_without_lung",
         }
     }
 }
@@ -122,6 +126,7 @@ pub fn label_map(
         paint(&mut map, &found.lungs.bounds, &lung.mask, label as u16);
     }
     for (bounds, mask, label) in [
+        (&found.lungs.bounds, &found.lungs.no_lung, Label::NoLung),
         (&found.lungs.bounds, &found.lungs.gas, Label::Gas),
         (&found.lungs.bounds, &found.lungs.airways, Label::Airways),
         (

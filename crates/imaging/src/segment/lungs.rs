@@ -36,6 +36,39 @@ const AIRWAYS_L: [f64; 2] = [2e-3, 0.2];
 /// Trachea and main bronchi are at least so long.
 const AIRWAY_LENGTH_M: f64 = 30e-3;
 
+/// The trachea, and not gas in a stomach: at most this section, m^2,
+const TRACHEA_SECTION_M2: f64 = 7e-4;
+
+/// its middle so near to the middle between the lungs, m,
+const TRACHEA_ASIDE_M: f64 = 30e-3;
+
+/// and above this share of their height, or this long, m: also that of a patient who is upside down in the file.
+const TRACHEA_ABOVE: f64 = 0.4;
+const TRACHEA_LENGTH_M: f64 = 60e-3;
+
+/// Air in the place of a lung that is emptier than this has no lung around it (LAA-950, the level of emphysema in CT:
+/// Gevenois et al., Am J Respir Crit Care Med 154:187, 1996).
+const NO_LUNG_HU: i16 = -950;
+
+/// So much of it is said and kept apart, l.
+const LEAST_NO_LUNG_L: f64 = 5e-3;
+
+/// How far from the midline it is no airway, m: beyond the lobar bronchi.
+const NO_AIRWAY_M: f64 = 45e-3;
+
+/// Two lungs have at least this share of their air on either side behind their middle: a single one crosses the midline
+/// in front of the heart, and not beside the spine.
+const BEHIND_SHARE: f64 = 0.1;
+
+/// A lung with less than this share of the other's air is worth a remark.
+const UNEQUAL: f64 = 0.65;
+
+/// Bone about the midline by which a spine is seen, l.
+const SPINE_L: f64 = 0.03;
+
+/// Half of the width in which it is summed up, m.
+const SPINE_M: f64 = 25e-3;
+
 /// Which lung.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Side {
@@ -79,6 +112,8 @@ pub struct Lungs {
     pub airways: Mask,
     /// Soft tissue in the lungs: vessels, and nodules that nobody has pointed at.
     pub vessels: Mask,
+    /// Air in the place of the lungs that has no lung around it: bullae, emphysema, a pneumothorax.
+    pub no_lung: Mask,
     /// Other enclosed air: stomach, bowel.
     pub gas: Mask,
     /// Median of the air in the lungs; none without lungs.
@@ -110,6 +145,7 @@ pub(super) fn find(
         lungs: Vec::new(),
         airways: Mask::empty(airy.size()),
         vessels: Mask::empty(airy.size()),
+        no_lung: Mask::empty(airy.size()),
         gas: airy.clone(),
         air_hu: scan.median(&candidates, &bounds),
     };
@@ -119,11 +155,14 @@ pub(super) fn find(
         )));
         return Ok(lungs);
     };
-    lungs.airways = airways(scan, &airy, &bounds, air_hu, remarks);
+    let midline = midline(scan, body);
+    let (airways, no_lung, empty_hu) =
+        empty_air(scan, &airy, &candidates, midline, &bounds, air_hu, remarks);
+    lungs.airways = airways;
     scan.check()?;
     let mut air = airy.clone();
     air.subtract(&lungs.airways);
-    let by_side = sides(scan, body, &air, remarks)?;
+    let by_side = sides(scan, midline, &bounds, &air, empty_hu, remarks)?;
     for (side, air) in by_side {
         let air_l = scan.litres(air.count());
         if air_l < LEAST_LUNG_L {
@@ -147,6 +186,11 @@ pub(super) fn find(
     }
     separate(&mut lungs, &airy);
     lungs.lungs.sort_by_key(|lung| lung.side);
+    for lung in &lungs.lungs {
+        lungs.no_lung.unite(&lung.mask);
+    }
+    lungs.no_lung.intersect(&no_lung);
+    note_no_lung(scan, &lungs, midline, remarks);
     lungs.gas.subtract(&lungs.airways);
     note_missing(scan, &lungs, remarks);
     Ok(lungs)
@@ -173,12 +217,29 @@ fn note_missing(scan: &Scan<'_>, lungs: &Lungs, remarks: &mut Vec<Remark>) {
             "no lung with {LEAST_LUNG_L} l of air found"
         ))),
         [lung] => remarks.push(Remark::new(format!(
-            "one lung found, on the patient's {} side",
+            "one lung found, on the patient's {} side: the other one is absent, without air, or was not scanned, and \
+             routes stay out of its half of the chest",
             match lung.side {
                 Side::Left => "left",
                 Side::Right => "right",
             }
         ))),
+        [one, other] => {
+            let (less, more) = if one.air_l < other.air_l {
+                (one, other)
+            } else {
+                (other, one)
+            };
+            if less.air_l < UNEQUAL * more.air_l {
+                remarks.push(Remark::new(format!(
+                    "{} has {:.1} l of air, the other lung {:.1} l: effusion, collapse, resection, or a part that was \
+                     not scanned; what is in its place counts as soft tissue",
+                    less.side.structure(),
+                    less.air_l,
+                    more.air_l
+                )));
+            }
+        }
         _ => {}
     }
     for lung in lungs.lungs.iter().filter(|lung| lung.cut) {
@@ -200,32 +261,122 @@ fn note_missing(scan: &Scan<'_>, lungs: &Lungs, remarks: &mut Vec<Remark>) {
     }
 }
 
-/// Trachea and bronchi: air that is clearly emptier than lung, of the size and length of airways.
-fn airways(
+fn note_no_lung(scan: &Scan<'_>, lungs: &Lungs, midline: f64, remarks: &mut Vec<Remark>) {
+    if lungs.no_lung.is_empty() {
+        return;
+    }
+    let axis = scan.axis_along(0);
+    let beyond = share_beyond(&lungs.no_lung, axis, midline);
+    let left = if runs_left(scan, axis) {
+        beyond
+    } else {
+        1.0 - beyond
+    };
+    let all_ml = 1e3 * scan.litres(lungs.no_lung.count());
+    let sides = [("left", left), ("right", 1.0 - left)]
+        .into_iter()
+        .filter(|(_, share)| share * all_ml >= 1.0)
+        .map(|(side, share)| format!("{:.0} ml on the patient's {side} side", share * all_ml));
+    remarks.push(Remark::new(format!(
+        "air without lung around it (below {NO_LUNG_HU} HU): {}; bullae, emphysema or a pneumothorax, which routes do \
+         not cross",
+        sides.collect::<Vec<_>>().join(", ")
+    )));
+}
+
+/// Where the patient's midline is, as an index along the axis to the left of a mask of the body's box.
+///
+/// Of a body that the field of view cuts at its left or right, the spine's; where that was not seen either, the side
+/// that is cut.
+fn midline(scan: &Scan<'_>, body: &Body) -> f64 {
+    let axis = scan.axis_along(0);
+    let middle = body.centroid[axis] - body.bounds.first[axis] as f64;
+    let is_cut = |side: &str| body.cut_sides.contains(&side);
+    if is_cut("left") == is_cut("right") {
+        return middle;
+    }
+    let within = body.mask.cropped(&body.bounds);
+    let mut counts = vec![0_usize; body.bounds.size()[axis]];
+    for voxel in scan
+        .denser(&within, &body.bounds, scan.levels.bone_hu)
+        .voxels()
+    {
+        counts[voxel[axis]] += 1;
+    }
+    let half = scan.voxels_across(SPINE_M, axis);
+    let around = |at: usize| -> usize {
+        let last = (at + half).min(counts.len() - 1);
+        counts[at.saturating_sub(half)..=last].iter().sum()
+    };
+    let best = (0..counts.len()).max_by_key(|&at| (around(at), usize::MAX - at));
+    match best.filter(|&at| scan.litres(around(at)) >= SPINE_L) {
+        Some(at) => at as f64,
+        None if is_cut("left") == runs_left(scan, axis) => counts.len() as f64,
+        None => 0.0,
+    }
+}
+
+/// Air that is clearly emptier than lung: trachea and bronchi by size, length and place, what has no lung around it, and
+/// the level between such air and lung.
+fn empty_air(
     scan: &Scan<'_>,
     airy: &Mask,
+    candidates: &Mask,
+    midline: f64,
     bounds: &IndexBox,
     lung_hu: i16,
     remarks: &mut Vec<Remark>,
-) -> Mask {
+) -> (Mask, Mask, Option<i16>) {
     let none = Mask::empty(airy.size());
     let contrast = lung_hu.saturating_add(1000);
     if contrast < AIRWAY_CONTRAST_HU {
         remarks.push(Remark::new(format!(
             "the air in the lungs is at {lung_hu} HU, as in the airways: they were not separated"
         )));
-        return none;
+        return (none.clone(), none, None);
     }
     let level = i32::from(lung_hu) - i32::from(contrast) / 2;
     let core = emptier_than(scan, airy, bounds, level);
     let parts = Components::of(&core, Connectivity::Faces);
+    let mut in_lungs = vec![false; parts.parts().len()];
+    for (part, [from, _], j, k) in parts.runs() {
+        in_lungs[part] = in_lungs[part] || candidates.get([from, j, k]);
+    }
+    let level_hu = i16::try_from(level).ok();
+    let Some(around) = candidates.bounds() else {
+        return (none.clone(), none, level_hu);
+    };
+    let [across, up] = [0, 2].map(|axis| scan.axis_along(axis));
+    let aside_m = |part: usize| {
+        (parts.parts()[part].centroid()[across] - midline).abs() * scan.spacing_m[across]
+    };
+    let is_trachea = |part: usize, length_m: f64| {
+        let each = &parts.parts()[part];
+        let height = (each.centroid()[up] - around.first[up] as f64) / around.size()[up] as f64;
+        let runs_up = scan.volume.grid.steps_m()[(2, up)] > 0.0;
+        let height = if runs_up { height } else { 1.0 - height };
+        let section_m2 = each.voxels as f64 * scan.voxel_m3() / length_m;
+        section_m2 <= TRACHEA_SECTION_M2
+            && aside_m(part) <= TRACHEA_ASIDE_M
+            && (height >= TRACHEA_ABOVE
+                || each.bounds.size()[up] as f64 * scan.spacing_m[up] >= TRACHEA_LENGTH_M)
+    };
     let is_airway = |part: usize| {
         let each = &parts.parts()[part];
         let length_m = (0..3)
             .map(|axis| each.bounds.size()[axis] as f64 * scan.spacing_m[axis])
             .fold(0.0, f64::max);
         let litres = scan.litres(each.voxels);
-        (AIRWAYS_L[0]..=AIRWAYS_L[1]).contains(&litres) && length_m >= AIRWAY_LENGTH_M
+        (AIRWAYS_L[0]..=AIRWAYS_L[1]).contains(&litres)
+            && length_m >= AIRWAY_LENGTH_M
+            && (is_trachea(part, length_m) || in_lungs[part] && aside_m(part) <= NO_AIRWAY_M)
+    };
+    // The rim of their inside is as dense as lung by partial volume.
+    let layer_m = 1.5 * scan.spacing_m[0].max(scan.spacing_m[1]);
+    let with_rim = |inside: &Mask| {
+        let mut whole = dilated(inside, layer_m, scan.spacing_m);
+        whole.intersect(airy);
+        whole
     };
     // The trachea is the largest of them; bronchi hang on it or are cut off by noise.
     let inside = parts.mask_of(is_airway);
@@ -233,13 +384,19 @@ fn airways(
         remarks.push(Remark::new(
             "no airways found: they may be part of the lungs",
         ));
-        return none;
     }
-    // The rim of their inside is as dense as lung by partial volume.
-    let layer_m = 1.5 * scan.spacing_m[0].max(scan.spacing_m[1]);
-    let mut airways = dilated(&inside, layer_m, scan.spacing_m);
-    airways.intersect(airy);
-    airways
+    let airways = with_rim(&inside);
+    let least = scan.voxels_of(LEAST_NO_LUNG_L);
+    let maybe = parts
+        .mask_of(|part| in_lungs[part] && !is_airway(part) && parts.parts()[part].voxels >= least);
+    if maybe.is_empty() {
+        return (airways, none, level_hu);
+    }
+    let empty = emptier_than(scan, &maybe, bounds, i32::from(NO_LUNG_HU));
+    let pockets = Components::of(&empty, Connectivity::Faces);
+    let mut no_lung = with_rim(&pockets.mask_of(|part| pockets.parts()[part].voxels >= least));
+    no_lung.subtract(&airways);
+    (airways, no_lung, level_hu)
 }
 
 /// Voxels whose mean with their neighbours along i, j and k is below a level.
@@ -289,13 +446,14 @@ fn emptier_than(scan: &Scan<'_>, airy: &Mask, bounds: &IndexBox, level: i32) -> 
 /// The air of each lung: pieces by the side of the body that they are on, and a piece that is on both cut in two.
 fn sides(
     scan: &Scan<'_>,
-    body: &Body,
+    middle: f64,
+    bounds: &IndexBox,
     air: &Mask,
+    empty_hu: Option<i16>,
     remarks: &mut Vec<Remark>,
 ) -> Result<Vec<(Side, Mask)>, ImagingError> {
     let pieces = Components::of(air, Connectivity::Faces);
     let axis = scan.axis_along(0);
-    let middle = body.centroid[axis] - body.bounds.first[axis] as f64;
     let mut left = Mask::empty(air.size());
     let mut right = Mask::empty(air.size());
     let least = scan.voxels_of(LEAST_PIECE_L);
@@ -304,8 +462,23 @@ fn sides(
             continue;
         }
         let mask = pieces.mask_of(|each| each == part);
+        let is_gas = || {
+            let middle_hu = scan.median(&mask, bounds);
+            empty_hu.is_some_and(|level| middle_hu.is_some_and(|middle| middle < level))
+        };
+        // Gas in a stomach is emptier than the lung above it.
+        if piece.voxels < scan.voxels_of(LEAST_LUNG_L) && is_gas() {
+            continue;
+        }
         let share = share_beyond(&mask, axis, middle);
-        if share.min(1.0 - share) < MERGED_SHARE {
+        let crosses = share.min(1.0 - share) >= MERGED_SHARE;
+        if !crosses || !is_behind_both(scan, &mask, axis, middle) {
+            if crosses {
+                remarks.push(Remark::new(
+                    "one lung reaches across the midline in front, and there is none beside the spine on the other \
+                     side: taken for a single lung",
+                ));
+            }
             let is_left = (piece.centroid()[axis] > middle) == runs_left(scan, axis);
             (if is_left { &mut left } else { &mut right }).unite(&mask);
             continue;
@@ -326,6 +499,27 @@ fn sides(
         }
     }
     Ok(vec![(Side::Left, left), (Side::Right, right)])
+}
+
+/// Whether a piece of air has some on both sides of the midline in its back half.
+fn is_behind_both(scan: &Scan<'_>, mask: &Mask, axis: usize, middle: f64) -> bool {
+    let Some(bounds) = mask.bounds() else {
+        return false;
+    };
+    let back = scan.axis_along(1);
+    let half = usize::midpoint(bounds.first[back], bounds.last[back]);
+    let mut behind = bounds;
+    if scan.volume.grid.steps_m()[(1, back)] > 0.0 {
+        behind.first[back] = half;
+    } else {
+        behind.last[back] = half;
+    }
+    let share = share_beyond(
+        &mask.cropped(&behind),
+        axis,
+        middle - behind.first[axis] as f64,
+    );
+    share.min(1.0 - share) >= BEHIND_SHARE
 }
 
 /// Whether an axis of the grid runs to the patient's left.

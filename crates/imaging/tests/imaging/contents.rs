@@ -1,7 +1,7 @@
-//! Blood with contrast medium and cartilage in a chest of analytic solids.
+//! Blood with contrast medium, cartilage, gas and lungs that are not as usual, in a chest of analytic solids.
 
 use nalgebra::Point3;
-use needlebench_imaging::{Label, Reconstruction, SurfaceTissue};
+use needlebench_imaging::{Label, Reconstruction, Side, SurfaceTissue};
 
 use super::reconstruct::{MM, Solid, chest, grid, options, render, run};
 
@@ -143,4 +143,97 @@ fn costal_cartilage_is_found_between_rib_and_sternum() {
     let made = run(&render(&solids, grid()), &options()).unwrap();
     assert_eq!(ml(&made, Label::Cartilage), 0.0);
     assert!(said(&made, "hardly any costal cartilage"));
+}
+
+/// A trachea between the lungs.
+fn trachea() -> Solid {
+    Solid(
+        Box::new(|p| libm::hypot(p.x, p.y - 20.0) <= 8.0 && p.z > 20.0),
+        -1000.0,
+    )
+}
+
+#[test]
+fn gas_in_a_stomach_is_neither_airway_nor_lung() {
+    let mut solids = chest();
+    solids.push(trachea());
+    // 18 ml beneath the left lung, in front.
+    let (at, axes) = ([25.0, -60.0, -72.0], [15.0, 14.0, 20.0]);
+    solids.push(Solid(
+        Box::new(move |p| {
+            (p - nalgebra::Vector3::from(at))
+                .component_div(&nalgebra::Vector3::from(axes))
+                .norm()
+                <= 1.0
+        }),
+        -990.0,
+    ));
+    let made = run(&render(&solids, grid()), &options()).unwrap();
+    assert_eq!(label_at(&made, at), Label::Gas as u16);
+    assert_eq!(label_at(&made, [0.0, 20.0, 50.0]), Label::Airways as u16);
+    assert!(ml(&made, Label::Airways) < 20.0);
+}
+
+#[test]
+fn air_without_lung_is_kept_apart_and_said() {
+    let mut solids = chest();
+    solids.push(trachea());
+    // A pneumothorax: the front of the left lung.
+    solids.push(Solid(
+        Box::new(|p| {
+            let lung = nalgebra::Vector3::new((p.x - 72.0) / 52.0, p.y / 68.0, p.z / 80.0);
+            lung.norm() <= 1.0 && p.y < -25.0
+        }),
+        -1000.0,
+    ));
+    let made = run(&render(&solids, grid()), &options()).unwrap();
+    assert_eq!(label_at(&made, [72.0, -45.0, 0.0]), Label::NoLung as u16);
+    assert_eq!(label_at(&made, [72.0, 20.0, 0.0]), Label::LungLeft as u16);
+    assert_eq!(
+        label_at(&made, [-72.0, -45.0, 0.0]),
+        Label::LungRight as u16
+    );
+    assert!(
+        said(&made, "on the patient's left side; bullae"),
+        "{:?}",
+        made.remarks
+    );
+}
+
+#[test]
+fn a_single_lung_across_the_midline_is_not_cut_in_two() {
+    // The right lung was taken out; the left one reaches over in front of the heart.
+    let mut solids = chest();
+    solids.push(Solid(
+        Box::new(|p| {
+            let lung = nalgebra::Vector3::new((p.x + 72.0) / 52.0, p.y / 68.0, p.z / 80.0);
+            lung.norm() <= 1.02 && p.y > -20.0
+        }),
+        20.0,
+    ));
+    solids.push(Solid(
+        Box::new(|p| p.x.abs() < 50.0 && (-50.0..-22.0).contains(&p.y) && p.z.abs() < 40.0),
+        -850.0,
+    ));
+    let made = run(&render(&solids, grid()), &options()).unwrap();
+    let lungs = &made.segmentation.lungs.lungs;
+    assert!(matches!(&lungs[..], [lung] if lung.side == Side::Left));
+    assert!(said(&made, "taken for a single lung"));
+    assert!(said(&made, "routes stay out of its half"));
+}
+
+#[test]
+fn a_lung_that_is_much_smaller_than_the_other_is_said() {
+    let mut solids = chest();
+    // An effusion fills its back.
+    solids.push(Solid(
+        Box::new(|p| {
+            let lung = nalgebra::Vector3::new((p.x - 72.0) / 52.0, p.y / 68.0, p.z / 80.0);
+            lung.norm() <= 1.02 && p.y > -5.0
+        }),
+        10.0,
+    ));
+    let made = run(&render(&solids, grid()), &options()).unwrap();
+    assert!(said(&made, "lung_left has 0."), "{:?}", made.remarks);
+    assert!(said(&made, "effusion"));
 }
