@@ -100,6 +100,7 @@ fn directions(criterion: &mut Criterion) {
             outside_m: rules.outside_m,
             lung_vessel_m: 3e-3,
             below_rib_m: 3e-3,
+            beside_sternum_m: 20e-3,
             threads: 1,
             cancel: &GO,
         };

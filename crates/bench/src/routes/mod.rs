@@ -160,6 +160,7 @@ impl RouteTask<'_> {
             outside_m: rules.outside_m,
             lung_vessel_m: self.rules.lung_vessel_mm * 1e-3,
             below_rib_m: self.rules.below_rib_mm * 1e-3,
+            beside_sternum_m: self.rules.beside_sternum_mm * 1e-3,
             threads: control.threads,
             cancel: control.cancel,
         };

@@ -139,7 +139,8 @@ impl Classes {
         }
         let is_bulla = ["bulla", "emphysema"]
             .iter()
-            .any(|word| lower.contains(word));
+            .any(|word| lower.contains(word))
+            || name == Label::NoLung.name();
         let is_fissure = lower.contains("fissure");
         if is_bulla || is_fissure {
             return Class {

@@ -17,37 +17,59 @@ pub(super) struct Mediastinum {
     first_slice: usize,
     /// By slice and row: first and last column.
     columns: Vec<Vec<Option<[usize; 2]>>>,
+    has_one_lung: bool,
 }
 
 impl Mediastinum {
-    /// Of a label map along the patient's axes (columns to the left, rows to the back) with both lungs; none without.
+    /// Of a label map along the patient's axes (columns to the left, rows to the back) with a lung; none without.
     ///
-    /// In a row of a slice it is what lies between the last voxel of the right lung and the first of the left one.
+    /// In a row of a slice it is what lies between the last voxel of the right lung and the first of the left one. Where
+    /// one lung is absent, heart and vessels may be anywhere in its half of the chest: that is in it, as wide as the other
+    /// lung on its side of the spine.
     pub fn of(labels: &LabelMap, classes: &Classes, within: &IndexBox) -> Option<Self> {
-        let [right, left] =
-            ["lung_right", "lung_left"].map(|name| classes.lung_called(name).map(Kind::Lung));
-        let (right, left) = (right?, left?);
         let kind = |label: u16| classes.get(classes.of_label(label)).kind;
         // Tables of a byte per label: every voxel is asked.
-        let table = |wanted: Kind| -> Vec<bool> {
-            (0..=u16::MAX).map(|label| kind(label) == wanted).collect()
+        let table = |wanted: &dyn Fn(Kind) -> bool| -> Vec<bool> {
+            (0..=u16::MAX).map(|label| wanted(kind(label))).collect()
         };
-        let (is_right, is_left, is_bone) = (table(right), table(left), table(Kind::Bone));
+        let has = |table: &[bool]| labels.labels.iter().any(|&label| table[usize::from(label)]);
+        let [is_right, is_left] = ["lung_right", "lung_left"].map(|name| {
+            let lung = classes.lung_called(name).map(Kind::Lung)?;
+            Some(table(&|kind| kind == lung)).filter(|table| has(table))
+        });
+        let is_bone = table(&|kind| kind == Kind::Bone);
         let [nx, ny, _] = labels.grid.size();
         let spacing_m = labels.grid.spacing_m();
+        let twice = || Some(2 * middle_of_body(labels, classes)?);
+        let has_one_lung = is_right.is_some() != is_left.is_some();
+        let between: Box<dyn Fn(&[u16]) -> Option<[usize; 2]>> = match (is_right, is_left) {
+            (Some(is_right), Some(is_left)) => Box::new(move |row| {
+                let last = last_in(row, &is_right)?;
+                let next = first_in(row, &is_left)?;
+                (last + 1 < next).then(|| [last + 1, next - 1])
+            }),
+            (Some(is_right), None) => {
+                let twice = twice()?;
+                Box::new(move |row| {
+                    let [first, last] = [first_in(row, &is_right)?, last_in(row, &is_right)?];
+                    let far = twice.saturating_sub(first).min(nx - 1);
+                    (last < far).then(|| [last + 1, far])
+                })
+            }
+            (None, Some(is_left)) => {
+                let twice = twice()?;
+                Box::new(move |row| {
+                    let [first, last] = [first_in(row, &is_left)?, last_in(row, &is_left)?];
+                    let far = twice.saturating_sub(last);
+                    (far < first).then(|| [far, first - 1])
+                })
+            }
+            (None, None) => return None,
+        };
         let (mut columns, mut fronts) = (Vec::new(), Vec::new());
         for k in within.first[2]..=within.last[2] {
             let slice = &labels.labels[k * nx * ny..(k + 1) * nx * ny];
-            let rows: Vec<Option<[usize; 2]>> = slice
-                .chunks_exact(nx)
-                .map(|row| {
-                    let last = row
-                        .iter()
-                        .rposition(|&label| is_right[usize::from(label)])?;
-                    let next = row.iter().position(|&label| is_left[usize::from(label)])?;
-                    (last + 1 < next).then(|| [last + 1, next - 1])
-                })
-                .collect();
+            let rows: Vec<Option<[usize; 2]>> = slice.chunks_exact(nx).map(&between).collect();
             let bone = |i: usize, j: usize| is_bone[usize::from(slice[j * nx + i])];
             fronts.push(front_of_spine(&rows, bone, SPINE_M / spacing_m[0], nx));
             columns.push(rows);
@@ -70,7 +92,13 @@ impl Mediastinum {
         Some(Self {
             first_slice: within.first[2],
             columns,
+            has_one_lung,
         })
+    }
+
+    /// Whether one lung is absent, and its half of the chest is part of it.
+    pub fn has_one_lung(&self) -> bool {
+        self.has_one_lung
     }
 
     /// First and last column of a row of a slice of the box that are in it.
@@ -83,6 +111,34 @@ impl Mediastinum {
         let columns = self.columns(j, k);
         columns.is_some_and(|[first, last]| (first..=last).contains(&i))
     }
+}
+
+fn first_in(row: &[u16], wanted: &[bool]) -> Option<usize> {
+    row.iter().position(|&label| wanted[usize::from(label)])
+}
+
+fn last_in(row: &[u16], wanted: &[bool]) -> Option<usize> {
+    row.iter().rposition(|&label| wanted[usize::from(label)])
+}
+
+/// The mean column of the body.
+pub(super) fn middle_of_body(labels: &LabelMap, classes: &Classes) -> Option<usize> {
+    let is_body: Vec<bool> = (0..=u16::MAX)
+        .map(|label| {
+            let kind = classes.get(classes.of_label(label)).kind;
+            !matches!(kind, Kind::Outside | Kind::Beside)
+        })
+        .collect();
+    let [nx, _, _] = labels.grid.size();
+    let (mut sum, mut count) = (0.0, 0.0);
+    for row in labels.labels.chunks_exact(nx) {
+        if let (Some(first), Some(last)) = (first_in(row, &is_body), last_in(row, &is_body)) {
+            let width = (last - first + 1) as f64;
+            sum += 0.5 * (first + last) as f64 * width;
+            count += width;
+        }
+    }
+    (count > 0.0).then(|| super::steps(sum / count))
 }
 
 /// The row where bone begins behind the middle of the space, in the median of the columns there; none where most have none.

@@ -2,6 +2,7 @@
 
 mod blocks;
 mod classes;
+mod mammary;
 mod mediastinum;
 mod normal;
 mod rays;
@@ -11,8 +12,8 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, Vector3};
 use needlebench_imaging::{
-    Components, Connectivity, DistanceField, DistanceOptions, ImagingError, IndexBox, LabelMap,
-    Mask, Remark, VoxelGrid, opened, structure_of,
+    Components, Connectivity, DistanceField, DistanceOptions, ImagingError, IndexBox, Label,
+    LabelMap, Mask, Remark, VoxelGrid, opened, structure_of,
 };
 use needlebench_phantom::Phantom;
 use needlebench_scenario::scenario::NeedleRouteSection;
@@ -74,6 +75,8 @@ pub struct VoxelOptions<'a> {
     pub lung_vessel_m: f64,
     /// What below each bone counts as intercostal vessels, m.
     pub below_rib_m: f64,
+    /// How far from the sternum's edges internal mammary vessels are modelled, m.
+    pub beside_sternum_m: f64,
     /// Threads to use; nothing depends on it.
     pub threads: usize,
     /// Set by another thread to give up.
@@ -178,6 +181,7 @@ impl VoxelAnatomy {
         anatomy.look_over(labels);
         anatomy.find_lung(centre);
         anatomy.mark_mediastinum(labels, centre, options.off);
+        anatomy.mark_mammary(labels, options.beside_sternum_m);
         if anatomy.target_lung.is_none() {
             anatomy.remarks.push(Remark::new(
                 "the target is not in a lung: needle paths avoid both lungs",
@@ -292,7 +296,7 @@ impl VoxelAnatomy {
         }
         let Some(between) = Mediastinum::of(labels, &self.classes, &self.within) else {
             self.remarks.push(Remark::new(
-                "the label map does not have both lungs: the mediastinum between them, with heart and large vessels, is unknown",
+                "the label map has no lung: the mediastinum, with heart and large vessels, is unknown",
             ));
             return;
         };
@@ -301,6 +305,12 @@ impl VoxelAnatomy {
                 "the target is in the mediastinum: needle paths may cross its soft tissue and avoid labelled structures",
             ));
             return;
+        }
+        if between.has_one_lung() {
+            self.remarks.push(Remark::new(
+                "the label map has one lung: its mediastinum is taken to fill the other half of the chest, which needle \
+                 paths avoid",
+            ));
         }
         let class = self.classes.add(Class::new(NAME, Kind::Organ));
         let [first, last] = [self.within.first, self.within.last];
@@ -318,6 +328,64 @@ impl VoxelAnatomy {
                     *voxel = class;
                     self.knows[Obstacle::Organ as usize] = true;
                 }
+            }
+        }
+    }
+
+    /// Makes vessels of the soft tissue beside the sternum, in front of lungs and mediastinum.
+    fn mark_mammary(&mut self, labels: &LabelMap, width_m: f64) {
+        if width_m <= 0.0 {
+            return;
+        }
+        let is_inside = |class: &Class| match class.kind {
+            Kind::Lung(_) | Kind::InLung => true,
+            Kind::Organ => class.mark != Mark::Gas,
+            _ => false,
+        };
+        let structure = |class: &Class| structure_of(&class.name).map(|structure| structure.name);
+        let named = |name: &str| -> Vec<bool> {
+            let classes = self.classes.all();
+            classes
+                .map(|class| structure(class).as_deref() == Some(name))
+                .collect()
+        };
+        // A label map with a sternum says which bone it is; cartilage hangs on it and is none.
+        let (sternum, cartilage) = (named("sternum"), named(Label::Cartilage.name()));
+        let has_sternum = self.voxels.iter().any(|&class| sternum[usize::from(class)]);
+        let tissues: Vec<mammary::Tissue> = self
+            .classes
+            .all()
+            .enumerate()
+            .map(|(number, class)| {
+                let is_sternum = match has_sternum {
+                    true => sternum[number],
+                    false => class.kind == Kind::Bone && !cartilage[number],
+                };
+                if is_sternum {
+                    mammary::Tissue::Bone
+                } else if is_inside(class) {
+                    mammary::Tissue::Inside
+                } else {
+                    mammary::Tissue::Other
+                }
+            })
+            .collect();
+        let Some(middle) = mediastinum::middle_of_body(labels, &self.classes) else {
+            return;
+        };
+        let tissue = |voxel| tissues[usize::from(self.voxels[self.offset(voxel)])];
+        let found = mammary::beside_sternum(&self.within, self.spacing_m, middle, width_m, tissue);
+        if found.is_empty() {
+            return;
+        }
+        let class = self.classes.add(Class::new(
+            "internal mammary vessels (modelled)",
+            Kind::Vessel,
+        ));
+        for voxel in found {
+            let at = self.offset(voxel);
+            if self.classes.get(self.voxels[at]).kind == Kind::Soft {
+                self.voxels[at] = class;
             }
         }
     }

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_imaging::{LabelMap, VoxelGrid};
 use needlebench_routing::{
-    Anatomy, Exit, Obstacle, Ray, Route, RouteRule, RouteRules, VoxelAnatomy, VoxelOptions, apart,
-    evenly, refined, search,
+    Anatomy, Exit, Nearest, Obstacle, Ray, Route, RouteRule, RouteRules, VoxelAnatomy,
+    VoxelOptions, apart, evenly, refined, search,
 };
 use needlebench_scenario::scenario::OddsSection;
 
@@ -127,6 +127,7 @@ fn anatomy(labels: &LabelMap, threads: usize) -> VoxelAnatomy {
             outside_m: rules().outside_m,
             lung_vessel_m: 3e-3,
             below_rib_m: 0.0,
+            beside_sternum_m: 0.0,
             threads,
             cancel: &GO,
         },
@@ -341,6 +342,7 @@ fn nothing_goes_through_a_marker_on_the_skin() {
             outside_m: rules().outside_m,
             lung_vessel_m: 3e-3,
             below_rib_m: 0.0,
+            beside_sternum_m: 0.0,
             threads: 1,
             cancel: &GO,
         };
@@ -415,6 +417,7 @@ fn what_lies_between_the_lungs_is_an_organ_but_not_the_muscles_of_the_back() {
             outside_m: 0.05,
             lung_vessel_m: 0.0,
             below_rib_m: 3e-3,
+            beside_sternum_m: 20e-3,
             threads: 1,
             cancel: &GO,
         };
@@ -463,10 +466,94 @@ fn what_lies_between_the_lungs_is_an_organ_but_not_the_muscles_of_the_back() {
     ];
     let labels = two_lungs(&odd);
     let anatomy = at(&labels, in_lung, &[]);
-    for word in ["`gizmo`, `structure_7`", "no bone", "both lungs"] {
+    for word in ["`gizmo`, `structure_7`", "no bone", "has one lung"] {
         assert!(said(&anatomy, word), "{word}");
     }
     assert!(!anatomy.knows(Obstacle::Bone));
+}
+
+/// What an anatomy about a target in the left lung comes nearest to across a stretch of a row, beside a place.
+fn nearest_across(
+    labels: &LabelMap,
+    [from, to]: [f64; 2],
+    row: f64,
+    obstacle: Obstacle,
+) -> Option<Nearest> {
+    let options = VoxelOptions {
+        patient: None,
+        lesions: &[],
+        off: &[],
+        needle_m: 0.15,
+        markers: &[],
+        outside_m: 0.05,
+        lung_vessel_m: 0.0,
+        below_rib_m: 0.0,
+        beside_sternum_m: 20e-3,
+        threads: 1,
+        cancel: &GO,
+    };
+    let in_lung = Point3::new(65.0 * 2e-3, 30.0 * 2e-3, 0.01);
+    let anatomy = VoxelAnatomy::new(labels, Vector3::zeros(), in_lung, &options).unwrap();
+    let ray = Ray {
+        target: Point3::new(65.0 * 2e-3, row * 2e-3, 0.01),
+        outwards: -Vector3::x_axis(),
+    };
+    let stretch_m = [65.0 - from, 65.0 - to].map(|columns| columns * 2e-3);
+    anatomy.nearest(&ray, stretch_m, obstacle)
+}
+
+#[test]
+fn where_one_lung_is_absent_its_half_of_the_chest_is_no_way() {
+    // Named, as in every map of `ct build`, and nowhere.
+    let names = [
+        (SOFT, "soft_tissue"),
+        (LUNG, "lung_left"),
+        (OTHER_LUNG, "other_tissue"),
+        (BONE, "bone"),
+        (VESSEL, "lung_right"),
+    ];
+    let labels = two_lungs(&names);
+    for columns in [[50.0, 47.0], [25.0, 20.0]] {
+        let found = nearest_across(&labels, columns, 30.0, Obstacle::Organ);
+        let name = found.map(|nearest| nearest.name);
+        assert_eq!(name.as_deref(), Some("mediastinum"), "{columns:?}");
+    }
+}
+
+#[test]
+fn beside_the_sternum_are_vessels_that_no_scan_shows() {
+    let names = [
+        (SOFT, "soft_tissue"),
+        (LUNG, "lung_left"),
+        (OTHER_LUNG, "lung_right"),
+        (BONE, "bone"),
+        (HEART, "costal_cartilages"),
+    ];
+    let mut labels = two_lungs(&names);
+    let grid = labels.grid.clone();
+    for (k, j) in (0..10).flat_map(|k| (4..8).map(move |j| (k, j))) {
+        for i in 40..50 {
+            labels.labels[grid.offset([i, j, k])] = BONE;
+        }
+        // Cartilage goes on from there, and is not the sternum's edge.
+        for i in 50..58 {
+            labels.labels[grid.offset([i, j, k])] = HEART;
+        }
+    }
+    let distance_mm = |columns: [f64; 2]| {
+        let found = nearest_across(&labels, columns, 8.5, Obstacle::Vessel).unwrap();
+        assert_eq!(found.name, "internal mammary vessels (modelled)");
+        1e3 * found.distance_m
+    };
+    // From 5 to 20 mm beside both edges, in the three rows in front of lungs and mediastinum, which begin at row 10.
+    for columns in [[57.0, 55.0], [35.0, 33.0]] {
+        assert!(distance_mm(columns) <= 0.0, "{columns:?}");
+    }
+    // 10 mm from the last of its columns, less what half a voxel may be wrong.
+    let beyond_mm = distance_mm([67.0, 65.0]);
+    assert!((6.0..=10.0).contains(&beyond_mm), "{beyond_mm}");
+    let at_midline_mm = distance_mm([46.0, 44.0]);
+    assert!((4.0..=12.0).contains(&at_midline_mm), "{at_midline_mm}");
 }
 
 #[test]
@@ -490,6 +577,7 @@ fn what_lies_between_the_lungs_is_no_way_out_of_the_body() {
         outside_m: 0.05,
         lung_vessel_m: 0.0,
         below_rib_m: 3e-3,
+        beside_sternum_m: 20e-3,
         threads: 1,
         cancel: &GO,
     };
@@ -584,6 +672,7 @@ fn targets_outside_are_refused() {
         outside_m: 0.05,
         lung_vessel_m: 0.0,
         below_rib_m: 3e-3,
+        beside_sternum_m: 20e-3,
         threads: 1,
         cancel: &GO,
     };

@@ -50,6 +50,11 @@ pub struct RouteSection {
     /// phantoms have the vessels.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub below_rib_mm: f64,
+    /// How far beside the edges of the sternum internal mammary vessels are modelled, mm, behind the cartilages: plain
+    /// CT does not show them (assumed; Glassberg et al. ask to plan around them, AJR 155:397, 1990). For needle paths in
+    /// a CT.
+    #[schemars(range(min = 0.0, max = 40.0))]
+    pub beside_sternum_mm: f64,
     /// Odds ratios by which needle paths are ranked.
     pub odds: OddsSection,
 }
@@ -67,6 +72,7 @@ impl Default for RouteSection {
             throw_mm: 10.0,
             lung_vessel_mm: 3.0,
             below_rib_mm: 3.0,
+            beside_sternum_mm: 20.0,
             odds: OddsSection::default(),
         }
     }
