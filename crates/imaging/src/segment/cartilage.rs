@@ -19,7 +19,7 @@ const ABOVE_MUSCLE_HU: f64 = 26.5;
 /// Where there is no muscle to measure, HU.
 const USUAL_LEVEL_HU: f64 = 80.5;
 
-/// How far beyond the box around the lungs it is looked for: in front of them, and along the costal arch, m.
+/// How far beyond the box around the lungs it is looked for: in front of them and along the costal arch, m.
 const BESIDE_LUNGS_M: f64 = 60e-3;
 
 /// Noise is averaged over this in each direction, m.
@@ -119,13 +119,16 @@ struct Piece {
     near_bone: usize,
 }
 
-/// In front of the middle of the body and of the lungs, and a little farther, in indices of the body's box; none
-/// without lungs.
+/// In front of the middle of the body, from above the lungs to below them, in indices of the body's box; none without
+/// lungs.
 fn front(scan: &Scan<'_>, body: &Body, lungs: &Lungs, bounds: &IndexBox) -> Option<IndexBox> {
     let axis = scan.axis_along(1);
     let middle = crate::spacing::whole(body.centroid[axis] - bounds.first[axis] as f64);
     let beyond = [0, 1, 2].map(|axis| scan.voxels_across(BESIDE_LUNGS_M, axis));
     let mut front = lungs.around()?.widened(beyond, bounds.size());
+    // Also before a lung that is absent.
+    let across = scan.axis_along(0);
+    [front.first[across], front.last[across]] = [0, bounds.size()[across] - 1];
     if scan.volume.grid.steps_m()[(1, axis)] > 0.0 {
         front.last[axis] = middle;
     } else {

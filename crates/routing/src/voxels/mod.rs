@@ -275,7 +275,7 @@ impl VoxelAnatomy {
         }
         if !missing.is_empty() {
             self.remarks.push(Remark::new(format!(
-                "the label map has no {}: needle paths avoid them only in the mediastinum, if both lungs are labelled; \
+                "the label map has no {}: needle paths avoid them only in the mediastinum; \
                  provide a label map that has them (`ct build --labels`)",
                 missing.join(", ")
             )));
