@@ -7,6 +7,7 @@ mod caught;
 mod dataset;
 mod file;
 mod image;
+mod jpeg_ls;
 mod pixels;
 mod segmentation;
 mod series;

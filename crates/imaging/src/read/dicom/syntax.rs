@@ -9,6 +9,7 @@ use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
 
 use super::caught::caught;
 use super::dataset::Encoding;
+use super::jpeg_ls;
 use crate::ImagingError;
 
 pub(super) use crate::read::in_mib;
@@ -113,19 +114,15 @@ impl TransferSyntax {
     /// Refuses what cannot be decoded, and says how to convert it.
     pub(super) fn check(&self) -> Result<(), ImagingError> {
         let uid = self.uid.as_str();
-        if self.is_plain() || uid == RLE || JPEG.contains(&uid) || JPEG_2000.contains(&uid) {
+        let decoded = [&JPEG[..], &JPEG_2000, &JPEG_LS].concat();
+        if self.is_plain() || uid == RLE || decoded.contains(&uid) {
             return Ok(());
         }
-        let hint = if JPEG_LS.contains(&uid) {
-            "decompress it with dcmdjpls IN OUT (DCMTK) or gdcmconv --raw IN OUT (GDCM)"
-        } else {
-            "decompress it with gdcmconv --raw IN OUT (GDCM), or dcmconv or dcmdjpeg (DCMTK)"
-        };
         Err(ImagingError::refused(format!(
             "the pixels are compressed by {}, which is not supported",
             self.name()
         ))
-        .hint(hint))
+        .hint("decompress it with gdcmconv --raw IN OUT (GDCM), or dcmconv or dcmdjpeg (DCMTK)"))
     }
 
     /// Stored numbers of one frame, little-endian.
@@ -166,6 +163,13 @@ impl TransferSyntax {
                 "they have {} bits, the file states {} for each",
                 stated.bits, frame.bits_allocated
             )));
+        }
+        if JPEG_LS.contains(&self.uid.as_str()) {
+            let size = [frame.columns, frame.rows].map(usize::from);
+            let values = jpeg_ls::decode(frame.bytes, size).map_err(wrong)?;
+            let width = usize::from(frame.bits_allocated / 8);
+            let bytes = |value| u64::from(value).to_le_bytes().into_iter().take(width);
+            return Ok(values.iter().copied().flat_map::<_, _>(bytes).collect());
         }
         let Some(Codec::EncapsulatedPixelData(Some(decoder), _)) = TransferSyntaxRegistry
             .get(&self.uid)
@@ -319,14 +323,16 @@ fn codestream_stated(bytes: &[u8]) -> Option<Stated> {
     })
 }
 
-/// Of JPEG: the frame header (SOF0 to SOF15 but the tables' markers).
+/// Of JPEG: the frame header (SOF0 to SOF15 but the tables' markers; SOF55 of JPEG-LS).
 fn jpeg_stated(bytes: &[u8]) -> Option<Stated> {
     let mut at = 2;
     loop {
         let [0xFF, marker, high, low] = *bytes.get(at..at + 4)? else {
             return None;
         };
-        let is_frame = (0xC0..=0xCF).contains(&marker) && ![0xC4, 0xC8, 0xCC].contains(&marker);
+        let is_ls = marker == jpeg_ls::FRAME;
+        let is_frame =
+            is_ls || (0xC0..=0xCF).contains(&marker) && ![0xC4, 0xC8, 0xCC].contains(&marker);
         if is_frame {
             let [bits, a, b, c, d, components] = *bytes.get(at + 4..at + 10)? else {
                 return None;
@@ -337,7 +343,7 @@ fn jpeg_stated(bytes: &[u8]) -> Option<Stated> {
                 components: components.into(),
                 tiles: 1,
                 bits: bits.into(),
-                is_any_width: false,
+                is_any_width: is_ls,
                 is_subsampled: false,
             });
         }
