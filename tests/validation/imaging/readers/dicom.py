@@ -26,6 +26,7 @@ from pydicom.uid import (
     JPEG2000Lossless,
     JPEGLosslessSV1,
     JPEGLSLossless,
+    JPEGLSNearLossless,
     RLELossless,
     generate_uid,
 )
@@ -319,12 +320,61 @@ def compressed(reader: Reader, folder: Path) -> None:
     remarks = reader.one(saved(path, lossy)).text["remarks"]
     assert not any("loss" in remark for remark in remarks), remarks
     damaged_streams(reader, folder, slices, lossy)
-    for each in slices:
-        each.file_meta.TransferSyntaxUID = JPEGLSLossless
-    refused(reader.one(saved(folder / "jpeg-ls", slices)), "JPEG-LS", "dcmdjpls", "gdcmconv")
+    jpeg_ls(reader, folder)
     for each in slices:
         each.file_meta.TransferSyntaxUID = MPEG2MPML
     refused(reader.one(saved(folder / "film", slices)), "MPEG2", "gdcmconv")
+
+
+def pictures(bits: int) -> Iterable[np.ndarray]:
+    """What JPEG-LS codes by its modes: noise, one value, gradients, runs with sharp ends, a body in air."""
+    greatest = 2**bits - 1
+    y, x = np.mgrid[:ROWS, :COLUMNS]
+    yield RNG.integers(0, greatest + 1, (ROWS, COLUMNS))
+    # CharLS takes the width of a picture from its greatest value: one pixel says it.
+    one = np.full((ROWS, COLUMNS), 1024 % greatest)
+    one[-1, -1] = greatest
+    yield one
+    yield (x * 37 + y * 5) % (greatest + 1)
+    yield np.repeat(RNG.integers(0, greatest + 1, (ROWS, COLUMNS // 8)), 8, axis=1)
+    yield RNG.choice([0, greatest], (ROWS, COLUMNS))
+    body = ((x - 20) / 15) ** 2 + ((y - 18) / 12) ** 2 < 1
+    yield np.clip(np.where(body, 1064 + RNG.normal(0, 12, x.shape), 24), 0, greatest).round()
+
+
+def jpeg_ls(reader: Reader, folder: Path) -> None:
+    """Lossless and nearly so, by CharLS."""
+    count = 0
+    for bits in (8, 10, 12, 16):
+        for near in (0, 2):
+            allocated = 8 if bits == 8 else 16
+            slices = [
+                slice_of(at, stored.astype(f"u{allocated // 8}"), (0, 0, at), BitsAllocated=allocated)
+                for at, stored in enumerate(pictures(bits))
+            ]
+            for each in slices:
+                each.BitsStored, each.HighBit = bits, bits - 1
+                stored = each.pixel_array.astype(int)
+                if near:
+                    each.compress(JPEGLSNearLossless, jls_error=near, generate_instance_uid=False)
+                else:
+                    each.compress(JPEGLSLossless, generate_instance_uid=False)
+                apart = np.abs(each.pixel_array.astype(int) - stored).max()
+                assert apart <= near, (bits, near, apart)
+            answer = reader.one(saved(folder / f"jpeg-ls-{bits}-{near}", slices))
+            same(answer, *expected(slices))
+            assert any("with loss" in remark for remark in answer.text["remarks"]) == (near > 0)
+            count += len(slices)
+    signed = [
+        slice_of(at, (stored.astype("i2") - 1024), (0, 0, at), RescaleIntercept=0)
+        for at, stored in enumerate(stored_slices())
+    ]
+    reference = expected(signed)
+    for each in signed:
+        each.compress(JPEGLSLossless, generate_instance_uid=False)
+    same(reader.one(saved(folder / "jpeg-ls-signed", signed)), *reference)
+    print(count + len(signed), "JPEG-LS slices are the same as by CharLS")
+    damaged_streams(reader, folder, slices)
 
 
 def damaged_streams(reader: Reader, folder: Path, *kinds: list[FileDataset]) -> None:
@@ -352,6 +402,10 @@ def damaged_streams(reader: Reader, folder: Path, *kinds: list[FileDataset]) -> 
             changed[43] = 2
             slices[0].PixelData = encapsulate([bytes(changed)])
             refused(reader.one(saved(folder / "stream", slices[:1])), "several of them")
+        elif changed[2:4] == b"\xff\xf7":
+            changed[6] = 17
+            slices[0].PixelData = encapsulate([bytes(changed)])
+            refused(reader.one(saved(folder / "stream", slices[:1])), "17 bits")
         else:
             at = changed.index(b"\xff\xc3")
             changed[at + 4] = 8

@@ -535,8 +535,89 @@ mod tests {
         0, 0, 90, 74, 68, 50, 43, 205, 64, 145, 145, 145, 100, 145, 145, 145,
     ];
 
+    /// By CharLS: 16 x 12 values of 16 bits, lossless and with errors of 2 at most, with runs and edges.
+    const LOSSLESS: &str = "ffd8fff7000b10000c001001011100fff8000d01ffff0012004301140040ffda00080101000000004058010040100804\
+        0201010df801a00000000000e2e3c498920000000000038a6d07070840018383c02534929253aac49000000000001c63\
+        69280000000000038b49002014038058a51c2e24e069c137b8640280200c028064440cd855c32858712a24ee30000000\
+        00001c96b000000000001c68780d00a009e17b76e59e1006e19e623cbe80040018383b37b24cedda2339174d62c65bcb\
+        6004070030b07fcc55fd7cf21d07000000000001c51280101c00806b28ae312af3250b35b8e1724010240500c77902a7\
+        340000000000038c7b93a02c6100061c3dc030380e010040600d4070280c0e008080ffd9";
+    const NEARLY: &str = "ffd8fff7000b10000c001001011100fff8000d01ffff0018004d01220040ffda00080101000200004060101010204082\
+        08bf00d0000000000019e3e1f0d00000000017360062900381ee51e8f6ae1e00000000034d1e00000000018780ea799b\
+        86da2ba599c800300304143cdb1d4a9e2361d0dc980000000005280000000000019ed6030854de565602d1917d8d9340\
+        04801b59757ed8ef8fc35c1430a2e91b68b75a3861b6a000000000000ced900200610c5e64c7717b54b2712900818431\
+        b5021a0000000000000cf4f768192801dc04040a03a818ffd9";
+
+    fn encoded(hex: &str) -> Vec<u8> {
+        let digits: Vec<u8> = hex
+            .chars()
+            .filter_map(|digit| digit.to_digit(16))
+            .map(|digit| digit as u8)
+            .collect();
+        digits
+            .chunks(2)
+            .map(|pair| pair[0] << 4 | pair[1])
+            .collect()
+    }
+
+    fn value_at(x: i32, y: i32) -> i32 {
+        if (x - 7).pow(2) + (y - 5).pow(2) < 20 {
+            40000 + 37 * x * y % 501
+        } else if x < 9 {
+            3
+        } else {
+            x * y % 4
+        }
+    }
+
     #[test]
     fn the_example_of_the_standard_is_decoded() {
         assert_eq!(decode(EXAMPLE, [4, 4]).unwrap(), VALUES);
+    }
+
+    #[test]
+    fn values_of_16_bits_are_as_near_as_the_stream_says() {
+        let expected: Vec<i32> = (0..12)
+            .flat_map(|y| (0..16).map(move |x| value_at(x, y)))
+            .collect();
+        for (hex, near) in [(LOSSLESS, 0), (NEARLY, 2)] {
+            let decoded = decode(&encoded(hex), [16, 12]).unwrap();
+            let errors = decoded
+                .iter()
+                .zip(&expected)
+                .map(|(a, b)| (i32::from(*a) - b).abs());
+            assert_eq!(errors.max(), Some(near));
+        }
+    }
+
+    #[test]
+    fn a_stream_cut_off_or_changed_never_panics() {
+        let whole = encoded(NEARLY);
+        for length in 0..whole.len() - 4 {
+            assert!(decode(&whole[..length], [16, 12]).is_err(), "{length}");
+        }
+        let mut refused = 0;
+        for at in 0..whole.len() {
+            for change in [0x01, 0x80, 0xFF] {
+                let mut changed = whole.clone();
+                changed[at] ^= change;
+                refused += u32::from(decode(&changed, [16, 12]).is_err());
+            }
+        }
+        assert!(refused > 100, "{refused}");
+    }
+
+    #[test]
+    fn what_is_not_one_grey_picture_in_a_scan_is_refused() {
+        let refused = |at: usize, byte: u8, size: [usize; 2]| {
+            let mut changed = EXAMPLE.to_vec();
+            changed[at] = byte;
+            decode(&changed, size).unwrap_err()
+        };
+        assert!(refused(6, 17, [4, 4]).contains("16 bits"));
+        assert!(refused(11, 3, [4, 4]).contains("one component"));
+        assert!(refused(21, 1, [4, 4]).contains("palette"));
+        assert!(refused(22, 200, [4, 4]).contains("parameters"));
+        assert!(refused(6, 8, [5, 4]).contains("another size"));
     }
 }
