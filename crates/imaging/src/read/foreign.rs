@@ -4,7 +4,7 @@
 use std::path::Path;
 
 /// The formats that are read, for a hint.
-pub(super) const READ: &str = "a CT is read from DICOM (a file, or a folder), NIfTI (.nii, .nii.gz, .hdr with .img), \
+pub(super) const READ: &str = "a CT is read from DICOM (a file, or a folder, also in a ZIP archive), NIfTI (.nii, .nii.gz, .hdr with .img), \
      NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), and MGH (.mgh, .mgz)";
 
 const UNPACK: &str = "unpack it, and name the DICOM folder or the volume in it";

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use super::archive::{self, Unpacked};
 use super::format::{Format, format_of};
 use super::voxels::StoredVoxels;
 use super::{ReadOptions, dicom, zeroed};
@@ -31,6 +32,8 @@ pub fn read_labels(
     options: &ReadOptions,
     cancel: &AtomicBool,
 ) -> Result<ReadLabels, ImagingError> {
+    let unpacked = archive::unpacked(path, options, cancel)?;
+    let path = unpacked.as_ref().map_or(path, Unpacked::path);
     match format_of(path)? {
         Format::Dicom => {
             let (labels, remarks) = dicom::read_segmentation(path, grid, options, cancel)?;

@@ -4,6 +4,7 @@
 //! Where a file leaves room for a guess it is refused; what is used although something about it is odd comes with a
 //! [`Remark`].
 
+mod archive;
 mod bytes;
 mod dicom;
 mod fields;
@@ -28,6 +29,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
+use self::archive::Unpacked;
 use self::format::{Format, format_of};
 use self::scalar::Tally;
 use self::voxels::StoredVoxels;
@@ -138,7 +140,9 @@ pub struct Description {
 }
 
 /// Reads a CT: a DICOM file, a folder of DICOM files, NIfTI (`.nii`, `.nii.gz`, `.hdr` with `.img`), NRRD (`.nrrd`, `.nhdr`),
-/// MetaImage (`.mha`, `.mhd`), or MGH (`.mgh`, `.mgz`).
+/// MetaImage (`.mha`, `.mhd`), MGH (`.mgh`, `.mgz`), or a ZIP archive of one of them.
+///
+/// An archive is unpacked into a temporary folder, which is removed afterwards.
 ///
 /// The result is the same whatever the number of `threads`.
 pub fn read_volume(
@@ -148,10 +152,15 @@ pub fn read_volume(
     cancel: &AtomicBool,
 ) -> Result<ReadVolume, ImagingError> {
     let _stage = tracing::debug_span!("read", file = %path.display()).entered();
-    let read = match format_of(path)? {
+    let unpacked = archive::unpacked(path, options, cancel)?;
+    let path = unpacked.as_ref().map_or(path, Unpacked::path);
+    let mut read = match format_of(path)? {
         Format::Dicom => dicom::read(path, options, threads, cancel),
         Format::Stored(open) => of_stored(open(path, options)?, options, cancel),
     }?;
+    if unpacked.is_some() {
+        read.description.format.push_str(", in a ZIP archive");
+    }
     let grid = &read.volume.grid;
     tracing::info!(
         format = read.description.format,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import shutil
+import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -494,6 +496,41 @@ def multi_frame(reader: Reader, folder: Path) -> None:
     refused(reader.one(folder / "frames-at-one-place.dcm"), "same position")
 
 
+class Stream(io.RawIOBase):
+    """Where nothing is gone back to, so that sizes come after the files."""
+
+    def __init__(self, path: Path) -> None:
+        self.file = path.open("wb")
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: bytes) -> int:
+        return self.file.write(data)
+
+
+def archives(reader: Reader, folder: Path, disc: Path, reference: tuple[np.ndarray, np.ndarray]) -> None:
+    """A folder in ZIP archives of Python: deflated, stored, of a stream; cut off."""
+    files = [path for path in sorted(disc.rglob("*")) if path.is_file()]
+    targets = {name: folder / f"{name}.zip" for name in ("deflated", "stored", "stream")}
+    for name, path in targets.items():
+        method = zipfile.ZIP_STORED if name == "stored" else zipfile.ZIP_DEFLATED
+        with zipfile.ZipFile(Stream(path) if name == "stream" else path, "w", method) as archive:
+            for file in files:
+                archive.write(file, file.relative_to(disc.parent))
+            archive.writestr("__MACOSX/disc/._A0", b"Mac OS X")
+        answer = reader.one(path)
+        same(answer, *reference, what=name)
+        assert answer.text["description"]["format"].endswith("in a ZIP archive")
+    whole = targets["deflated"].read_bytes()
+    for keep in range(4, len(whole), len(whole) // 7):
+        (folder / "cut.zip").write_bytes(whole[:keep])
+        refused(reader.one(folder / "cut.zip"), "damaged or cut off")
+    with zipfile.ZipFile(folder / "bzip2.zip", "w", zipfile.ZIP_BZIP2) as archive:
+        archive.write(files[0], "IM0")
+    refused(reader.one(folder / "bzip2.zip"), "bzip2", "unpack it")
+
+
 def folders(reader: Reader, folder: Path) -> None:
     """What people have in folders."""
     both = [*series(), *series(7, SeriesInstanceUID="1.2.3.9", SeriesNumber=5, ConvolutionKernel="B70f")]
@@ -550,6 +587,7 @@ def folders(reader: Reader, folder: Path) -> None:
     index = Path(pydicom.data.get_testdata_file("DICOMDIR"))
     shutil.copy(index, folder / "disc" / "DICOMDIR")
     same(reader.one(folder / "disc"), *expected(disc))
+    archives(reader, folder, folder / "disc", expected(disc))
     other = slice_of(9, np.zeros((16, 16), "u2"), (0, 0, 50))
     path = saved(folder / "sizes", [*series(), other])
     remarked(reader.one(path), "16 x 16")

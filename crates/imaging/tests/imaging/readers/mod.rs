@@ -1,5 +1,6 @@
 //! Readers: what is read as meant, what is refused, and that nothing makes them panic.
 
+mod archive;
 mod dicom;
 mod labels;
 mod made;

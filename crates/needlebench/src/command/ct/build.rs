@@ -56,7 +56,7 @@ marker [[markers]] with name and position_mm. With \"base_link\" or \"base\" the
 
 #[derive(Debug, Args)]
 pub(crate) struct BuildArguments {
-    /// A DICOM file, a folder of DICOM files, NIfTI, NRRD, MetaImage or MGH.
+    /// A DICOM file or folder, NIfTI, NRRD, MetaImage, MGH, or a ZIP of one.
     #[arg(value_name = "PATH")]
     path: PathBuf,
     /// Folder for the results.

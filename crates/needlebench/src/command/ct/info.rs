@@ -74,7 +74,7 @@ impl ReadArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArguments {
-    /// A DICOM file, a folder of DICOM files, NIfTI, NRRD, MetaImage or MGH.
+    /// A DICOM file or folder, NIfTI, NRRD, MetaImage, MGH, or a ZIP of one.
     #[arg(value_name = "PATH")]
     path: PathBuf,
     #[command(flatten)]
