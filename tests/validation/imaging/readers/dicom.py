@@ -15,6 +15,7 @@ from common import BIRTH_DATE, NAME, PATIENT_ID, Reader, as_hu, refused, remarke
 from pydicom.data import get_testdata_files
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
 from pydicom.encaps import encapsulate, generate_frames
+from pydicom.fileset import FileSet
 from pydicom.sequence import Sequence
 from pydicom.uid import (
     JPEG2000,
@@ -531,6 +532,38 @@ def archives(reader: Reader, folder: Path, disc: Path, reference: tuple[np.ndarr
     refused(reader.one(folder / "bzip2.zip"), "bzip2", "unpack it")
 
 
+def indexed(reader: Reader, folder: Path) -> None:
+    """A disc with a DICOMDIR by pydicom: the index itself, its folder, in a ZIP archive, with files missing."""
+    slices = series()
+    reference = expected(slices)
+    disc = FileSet()
+    for at, each in enumerate(slices):
+        each.StudyDate, each.StudyTime, each.StudyID, each.InstanceNumber = "20240101", "120000", "1", at + 1
+        disc.add(each)
+    disc.write(folder)
+    (folder / "other").mkdir()
+    slice_of(0, stored_slices()[0], (0, 0, 0), SeriesNumber=8, SeriesInstanceUID="1.2.8").save_as(
+        folder / "other" / "IM0", enforce_file_format=True
+    )
+    same(reader.one(folder / "DICOMDIR"), *reference)
+    packed = Path(shutil.make_archive(str(folder), "zip", folder))
+    for path in (folder, packed):
+        answer = reader.one(path)
+        same(answer, *reference)
+        assert not any("missing" in remark for remark in answer.text["remarks"]), answer.text["remarks"]
+    files = sorted(path for path in folder.rglob("IM*") if path.parent.name != "other")
+    assert len(files) == SLICES, files
+    last = next(path for path in files if pydicom.dcmread(path).SOPInstanceUID == slices[-1].SOPInstanceUID)
+    last.unlink()
+    for path in (folder / "DICOMDIR", folder):
+        answer = reader.one(path)
+        remarked(answer, "1 of the 6 files that the DICOMDIR names are missing")
+        assert answer.text["size"][2] == SLICES - 1
+    for path in files:
+        path.unlink(missing_ok=True)
+    refused(reader.one(folder / "DICOMDIR"), "none of the 6 files", "whole disc")
+
+
 def folders(reader: Reader, folder: Path) -> None:
     """What people have in folders."""
     both = [*series(), *series(7, SeriesInstanceUID="1.2.3.9", SeriesNumber=5, ConvolutionKernel="B70f")]
@@ -588,6 +621,7 @@ def folders(reader: Reader, folder: Path) -> None:
     shutil.copy(index, folder / "disc" / "DICOMDIR")
     same(reader.one(folder / "disc"), *expected(disc))
     archives(reader, folder, folder / "disc", expected(disc))
+    indexed(reader, folder / "index")
     other = slice_of(9, np.zeros((16, 16), "u2"), (0, 0, 50))
     path = saved(folder / "sizes", [*series(), other])
     remarked(reader.one(path), "16 x 16")

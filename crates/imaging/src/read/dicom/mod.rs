@@ -1,10 +1,11 @@
-//! DICOM: one file, or all files of a folder and its folders.
+//! DICOM: one file, all files of a folder and its folders, or those that a DICOMDIR names.
 //!
 //! The elements that are needed are read by a reader of our own, which skips all others unread and holds each length
 //! against the file; pixels are decoded by dicom-rs.
 
 mod caught;
 mod dataset;
+mod directory;
 mod file;
 mod image;
 mod jpeg_ls;
@@ -19,6 +20,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use self::directory::Directory;
 use self::file::OpenedFile;
 use self::image::{Slice, named, slices};
 use self::stack::Stack;
@@ -44,6 +46,7 @@ struct Found {
     /// Files that are DICOM, and could not be read, with why.
     broken: Vec<ImagingError>,
     others: usize,
+    remarks: Vec<Remark>,
 }
 
 pub(super) fn read(
@@ -56,6 +59,7 @@ pub(super) fn read(
         slices,
         mut broken,
         others,
+        remarks: mut found_remarks,
     } = find(path, options, cancel)?;
     if slices.is_empty() {
         return Err(if broken.is_empty() {
@@ -65,6 +69,7 @@ pub(super) fn read(
         });
     }
     let (series, mut remarks) = series::choose(series::all(slices), options.series.as_deref())?;
+    remarks.append(&mut found_remarks);
     if let Some(problem) = broken.first() {
         // Which series it was of is not known: it may be the missing slice.
         return Err(ImagingError::refused(format!(
@@ -128,31 +133,36 @@ fn place_of(problem: &ImagingError) -> String {
 
 /// All slices of the files at a path.
 fn find(path: &Path, options: &ReadOptions, cancel: &AtomicBool) -> Result<Found, ImagingError> {
-    let mut files = Vec::new();
-    if path.is_dir() {
-        collect(path, DEPTH, &mut files)?;
-        files.sort();
-    } else {
-        files.push(path.to_owned());
-    }
     let mut found = Found {
         slices: Vec::new(),
         broken: Vec::new(),
         others: 0,
+        remarks: Vec::new(),
     };
+    let mut files = Vec::new();
+    let mut folder = path;
+    if path.is_dir() {
+        collect(path, DEPTH, &mut files)?;
+        files.sort();
+    } else if let Some(directory) = directory_at(path, options)? {
+        directory.check()?;
+        found.remarks.extend(directory.remark(&name_in(path, path)));
+        files = directory.files;
+        folder = path.parent().unwrap_or(path);
+    } else {
+        files.push(path.to_owned());
+    }
     for file in files {
         if cancel.load(Ordering::Relaxed) {
             return Err(ImagingError::Interrupted);
         }
-        let name = match file.strip_prefix(path) {
-            Ok(inner) if inner.components().next().is_some() => inner.display().to_string(),
-            _ => file
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
-        };
+        let name = name_in(folder, &file);
         let opened = OpenedFile::open(&file, options.max_bytes);
+        if let Ok(Some(opened)) = &opened
+            && let Some(directory) = Directory::of(opened, &file)
+        {
+            found.remarks.extend(directory.remark(&name));
+        }
         match opened.map(|opened| opened.map(|opened| slices(opened, &file, &name))) {
             Ok(None) => found.others += 1,
             Ok(Some(Ok(slices))) if slices.is_empty() => found.others += 1,
@@ -162,6 +172,28 @@ fn find(path: &Path, options: &ReadOptions, cancel: &AtomicBool) -> Result<Found
         }
     }
     Ok(found)
+}
+
+/// The index of a disc that a file is; none of any other.
+fn directory_at(path: &Path, options: &ReadOptions) -> Result<Option<Directory>, ImagingError> {
+    let opened = OpenedFile::open(path, options.max_bytes);
+    // What is wrong with another file says itself when it is read.
+    let Ok(Some(opened)) = opened else {
+        return Ok(None);
+    };
+    Ok(Directory::of(&opened, path))
+}
+
+/// A file for people: by the folders that lead to it.
+fn name_in(folder: &Path, file: &Path) -> String {
+    match file.strip_prefix(folder) {
+        Ok(inner) if inner.components().next().is_some() => inner.display().to_string(),
+        _ => file
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
+    }
 }
 
 /// Files of a folder and its folders. Links to folders are not followed: they may lead in circles.

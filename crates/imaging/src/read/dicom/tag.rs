@@ -15,6 +15,7 @@ macro_rules! tags {
 tags! {
     META_SOP_CLASS = 0x0002_0002;
     TRANSFER_SYNTAX = 0x0002_0010;
+    REFERENCED_FILE = 0x0004_1500;
     IMAGE_TYPE = 0x0008_0008;
     SOP_CLASS = 0x0008_0016;
     SOP_INSTANCE_UID = 0x0008_0018;
@@ -68,6 +69,7 @@ pub(super) const INTEGER_STRINGS: [Tag; 3] = [SERIES_NUMBER, ACQUISITION_NUMBER,
 pub(super) const LONGS: [Tag; 1] = [TEMPORAL_POSITION_INDEX];
 
 /// Sequences that are gone into.
+pub(super) const DIRECTORY_RECORDS: Tag = 0x0004_1220;
 pub(super) const SHARED_GROUPS: Tag = 0x5200_9229;
 pub(super) const FRAME_GROUPS: Tag = 0x5200_9230;
 pub(super) const SEGMENTS: Tag = 0x0062_0002;
@@ -85,7 +87,8 @@ const CT_X_RAY: Tag = 0x0018_9325;
 const SEGMENT_IDENTIFICATION: Tag = 0x0062_000A;
 const CARDIAC_SYNCHRONIZATION: Tag = 0x0018_9118;
 
-const SEQUENCES: [Tag; 16] = [
+const SEQUENCES: [Tag; 17] = [
+    DIRECTORY_RECORDS,
     CARDIAC_SYNCHRONIZATION,
     CT_RECONSTRUCTION,
     CT_X_RAY,

@@ -2,6 +2,7 @@
 
 mod archive;
 mod dicom;
+mod directory;
 mod labels;
 mod made;
 mod metaimage;
