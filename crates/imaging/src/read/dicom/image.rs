@@ -49,6 +49,8 @@ pub(super) struct ImageFile {
     pub(super) gantry_tilt: Option<f64>,
     pub(super) segmentation: Option<Segmentation>,
     bits_allocated: i64,
+    /// Whether frames have elements of their own.
+    pub(super) has_frame_groups: bool,
 }
 
 impl ImageFile {
@@ -85,12 +87,98 @@ pub(super) struct SeriesKey {
     pub(super) number: Option<i64>,
     pub(super) uid: String,
     pub(super) is_scout: bool,
+    /// What its values are made of, where they are not those of a thin slice.
+    pub(super) made: Option<Made>,
     pub(super) modality: Option<String>,
     pub(super) columns: u16,
     pub(super) rows: u16,
     pub(super) kernel: Option<String>,
     pub(super) stack: Option<String>,
     pub(super) frame_of_reference: Option<String>,
+}
+
+/// What values are made of, rather than one measurement each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Made {
+    Maxima,
+    Minima,
+    Rendering,
+    Projection,
+    CurvedReformat,
+}
+
+impl Made {
+    /// By the words of an image type, and of how an image was computed.
+    fn of(types: &[String]) -> Option<Self> {
+        let values: Vec<String> = types
+            .iter()
+            .flat_map(|text| text.split('\\'))
+            .map(|value| value.trim().to_ascii_uppercase().replace(['_', '-'], " "))
+            .collect();
+        let has = |words: &[&str]| {
+            let is_said = |value: &String| {
+                let value = format!(" {value} ");
+                words
+                    .iter()
+                    .any(|word| value.contains(&format!(" {word} ")))
+            };
+            values.iter().any(is_said)
+        };
+        if has(&["MIP", "MAX IP", "MAXIP", "MAXIMUM INTENSITY"]) {
+            Some(Self::Maxima)
+        } else if has(&["MINIP", "MIN IP", "MINIMUM INTENSITY"]) {
+            Some(Self::Minima)
+        } else if has(&["VRT", "VOLUME RENDER", "SURFACE RENDER", "SSD"]) {
+            Some(Self::Rendering)
+        } else if has(&["CURVED MPR", "CPR"]) {
+            Some(Self::CurvedReformat)
+        } else if has(&["PROJECTION IMAGE"]) {
+            Some(Self::Projection)
+        } else {
+            None
+        }
+    }
+
+    /// For people.
+    pub(super) fn in_words(self) -> &'static str {
+        match self {
+            Self::Maxima => {
+                "maximum intensity projections (MIP): each value is the greatest of a slab"
+            }
+            Self::Minima => {
+                "minimum intensity projections (MinIP): each value is the least of a slab"
+            }
+            Self::Rendering => "pictures of a rendering",
+            Self::Projection => "projections of a volume",
+            Self::CurvedReformat => "curved reformats",
+        }
+    }
+}
+
+/// Image types of cone beam CT, where its modality is CT.
+const CONE_BEAM: [&str; 4] = ["CBCT", "CONE BEAM", "CONEBEAM", "DYNACT"];
+
+/// Ways to tell phases: acquisition, temporal position, its index, trigger time, percentage of the cardiac and of the
+/// breathing cycle, one in a description; and times that all slices of a phase share.
+pub(super) const WAYS: usize = 10;
+
+/// The first of the ways that is a time: it may also differ from one turn of the tube to the next.
+pub(super) const TIMES: usize = 7;
+
+/// Where the percentage of a description is among the ways.
+pub(super) const PERCENTAGE: usize = 6;
+
+/// The percentage that a description has, as in `Gated, 30.0%`: nothing else of it is kept.
+fn percentage(text: &str) -> Option<String> {
+    let (before, _) = text.split_once('%')?;
+    let number = before
+        .trim_end()
+        .rsplit(|letter: char| !letter.is_ascii_digit() && letter != '.')
+        .next()?;
+    let percent = number.parse::<f64>().ok()?;
+    (0.0..=100.0)
+        .contains(&percent)
+        .then(|| percent.to_string())
 }
 
 /// One slice.
@@ -109,9 +197,9 @@ pub(super) struct Slice {
     pub(super) thickness_mm: Option<f64>,
     pub(super) tube_voltage_kv: Option<f64>,
     pub(super) patient_position: Option<PatientPosition>,
-    /// What may tell phases of one series: acquisition, temporal position, its index, trigger time, part of the
-    /// heart's cycle, and times that all slices of a phase share.
-    pub(super) phase: [Option<String>; 8],
+    /// What may tell phases of one series, by [`WAYS`].
+    pub(super) phase: [Option<String>; WAYS],
+    pub(super) is_cone_beam: bool,
     /// Of a segmentation.
     pub(super) segment: Option<i64>,
 }
@@ -206,6 +294,7 @@ pub(super) fn slices(
         gantry_tilt: data.real(tag::GANTRY_TILT).ok().flatten(),
         segmentation: segmentation(&data),
         bits_allocated: data.integer(tag::BITS_ALLOCATED).unwrap_or(0),
+        has_frame_groups: !of_frames.is_empty(),
         syntax,
     });
     let slice = |frame: usize| {
@@ -216,12 +305,23 @@ pub(super) fn slices(
 }
 
 fn slice_of(file: &Arc<ImageFile>, frame: usize, layers: &Layers) -> Slice {
-    let types = [tag::FRAME_TYPE, tag::IMAGE_TYPE].map(|tag| layers.text(tag).unwrap_or_default());
+    let types = [tag::FRAME_TYPE, tag::IMAGE_TYPE, tag::VOLUME_TECHNIQUE]
+        .map(|tag| layers.text(tag).unwrap_or_default());
+    let modality = layers.text(tag::MODALITY);
+    let is_cone_beam = modality.as_deref() == Some("XA")
+        || types.iter().any(|text| {
+            let text = text.to_ascii_uppercase().replace('_', " ");
+            CONE_BEAM.iter().any(|word| text.contains(word))
+        });
     let is_scout = types
         .iter()
         .any(|text| text.split('\\').any(|word| word.trim() == "LOCALIZER"));
     let integer = |tag| layers.first(|data| data.integer(tag));
     let has = |tag| layers.text(tag).is_some();
+    let percent = |tag| {
+        let percent = layers.real(tag).ok().flatten();
+        percent.map(|percent| percent.to_string())
+    };
     Slice {
         file: Arc::clone(file),
         frame,
@@ -229,7 +329,8 @@ fn slice_of(file: &Arc<ImageFile>, frame: usize, layers: &Layers) -> Slice {
             number: integer(tag::SERIES_NUMBER),
             uid: layers.text(tag::SERIES_UID).unwrap_or_default(),
             is_scout,
-            modality: layers.text(tag::MODALITY),
+            made: Made::of(&types),
+            modality,
             columns: file.columns,
             rows: file.rows,
             kernel: layers.text(tag::KERNEL),
@@ -246,16 +347,17 @@ fn slice_of(file: &Arc<ImageFile>, frame: usize, layers: &Layers) -> Slice {
         patient_position: layers
             .text(tag::PATIENT_POSITION)
             .and_then(|term| PatientPosition::of_term(&term)),
+        is_cone_beam,
         phase: [
             integer(tag::ACQUISITION_NUMBER).map(|number| number.to_string()),
             layers.text(tag::TEMPORAL_POSITION),
             integer(tag::TEMPORAL_POSITION_INDEX).map(|number| number.to_string()),
             layers.text(tag::TRIGGER_TIME),
-            layers
-                .real(tag::NOMINAL_CARDIAC_PERCENTAGE)
-                .ok()
-                .flatten()
-                .map(|percent| percent.to_string()),
+            percent(tag::NOMINAL_CARDIAC_PERCENTAGE),
+            percent(tag::NOMINAL_RESPIRATORY_PERCENTAGE),
+            [tag::SERIES_DESCRIPTION, tag::IMAGE_COMMENTS]
+                .into_iter()
+                .find_map(|tag| percentage(&layers.text(tag)?)),
             layers.text(tag::ACQUISITION_DATE_TIME),
             layers.text(tag::ACQUISITION_TIME),
             layers.text(tag::CONTENT_TIME),

@@ -40,12 +40,17 @@ const FILES: usize = 200_000;
 /// Difference in degrees between the tilt that the positions have and that of the header, which is worth a remark.
 const TILT_DEG: f64 = 0.5;
 
+/// Slices of a scan overlap by half, or by two thirds: with more they are slabs made of thinner ones.
+const OVERLAP: f64 = 3.01;
+
 /// What was found at a path.
 struct Found {
     slices: Vec<Slice>,
     /// Files that are DICOM, and could not be read, with why.
     broken: Vec<ImagingError>,
     others: usize,
+    /// Of the others, those without a byte.
+    empty: Vec<String>,
     remarks: Vec<Remark>,
 }
 
@@ -59,11 +64,12 @@ pub(super) fn read(
         slices,
         mut broken,
         others,
+        empty,
         remarks: mut found_remarks,
     } = find(path, options, cancel)?;
     if slices.is_empty() {
         return Err(if broken.is_empty() {
-            without_images(path, others)
+            without_images(path, others, empty.len())
         } else {
             broken.swap_remove(0)
         });
@@ -80,6 +86,7 @@ pub(super) fn read(
         .at(place_of(problem))
         .hint("copy or export it again, or remove it from the folder"));
     }
+    remarks.extend(check_empty(&empty, &series.slices)?);
     let label = series.label.clone();
     let stack = stack::stack(series.slices, options.fill_gaps)?;
     remarks.extend(header_remarks(&stack));
@@ -112,7 +119,11 @@ pub(super) fn read(
     })
 }
 
-fn without_images(path: &Path, files: usize) -> ImagingError {
+fn without_images(path: &Path, files: usize, empty: usize) -> ImagingError {
+    if empty > 0 && empty == files {
+        return ImagingError::refused(format!("all {files} files are empty (0 bytes)"))
+            .hint("copy or export them again");
+    }
     let what = match (path.is_dir(), files) {
         (false, _) => "it is DICOM, but not an image".to_owned(),
         (true, 0) => "the folder is empty".to_owned(),
@@ -120,6 +131,43 @@ fn without_images(path: &Path, files: usize) -> ImagingError {
     };
     ImagingError::refused(what)
         .hint("name a folder with the DICOM files of a scan, or a .nii or .nii.gz file")
+}
+
+/// Refuses files without a byte that are called as the slices are; else remarks on them.
+fn check_empty(empty: &[String], slices: &[Slice]) -> Result<Option<Remark>, ImagingError> {
+    let Some(first) = empty.first() else {
+        return Ok(None);
+    };
+    let named: BTreeSet<String> = slices
+        .iter()
+        .map(|slice| without_digits(&slice.file.name))
+        .collect();
+    let mut like_slices = empty
+        .iter()
+        .filter(|name| named.contains(&without_digits(name)));
+    if let Some(first) = like_slices.next() {
+        return Err(ImagingError::refused(format!(
+            "{} of the files are empty (0 bytes) and named like the slices: slices are missing",
+            1 + like_slices.count()
+        ))
+        .at(first.clone())
+        .hint("copy or export the series again"));
+    }
+    let message = format!("{} files are empty (0 bytes): ignored", empty.len());
+    Ok(Some(Remark::new(message).at(first.clone())))
+}
+
+/// A name with one mark for each of its numbers.
+fn without_digits(name: &str) -> String {
+    let mut plain = String::new();
+    for letter in name.chars() {
+        if !letter.is_ascii_digit() {
+            plain.push(letter);
+        } else if !plain.ends_with('#') {
+            plain.push('#');
+        }
+    }
+    plain
 }
 
 fn place_of(problem: &ImagingError) -> String {
@@ -137,6 +185,7 @@ fn find(path: &Path, options: &ReadOptions, cancel: &AtomicBool) -> Result<Found
         slices: Vec::new(),
         broken: Vec::new(),
         others: 0,
+        empty: Vec::new(),
         remarks: Vec::new(),
     };
     let mut files = Vec::new();
@@ -164,7 +213,12 @@ fn find(path: &Path, options: &ReadOptions, cancel: &AtomicBool) -> Result<Found
             found.remarks.extend(directory.remark(&name));
         }
         match opened.map(|opened| opened.map(|opened| slices(opened, &file, &name))) {
-            Ok(None) => found.others += 1,
+            Ok(None) => {
+                found.others += 1;
+                if file.metadata().is_ok_and(|file| file.len() == 0) {
+                    found.empty.push(name);
+                }
+            }
             Ok(Some(Ok(slices))) if slices.is_empty() => found.others += 1,
             Ok(Some(Ok(slices))) => found.slices.extend(slices),
             Ok(Some(Err(problem))) => found.broken.push(problem),
@@ -266,9 +320,26 @@ fn header_remarks(stack: &Stack) -> Vec<Remark> {
             .at(&*slice.file.name),
         );
     }
+    if let Some((slice, _)) = first_with(&|slice| slice.is_cone_beam) {
+        let message = "cone beam CT: its values are not calibrated Hounsfield units";
+        remarks.push(Remark::new(message).at(&*slice.file.name));
+    }
+    remarks.extend(overlapping(stack));
     remarks.extend(varying_rescale(slices));
     remarks.extend(tilt(stack));
     remarks
+}
+
+/// That slices are slabs, of which each has much of the next.
+fn overlapping(stack: &Stack) -> Option<Remark> {
+    let [.., step_m] = stack.grid.spacing_m();
+    let (step_mm, thickness_mm) = (step_m * 1e3, stack.slices[0].thickness_mm?);
+    (stack.slices.len() > 1 && thickness_mm > OVERLAP * step_mm).then(|| {
+        Remark::new(format!(
+            "slices are {thickness_mm} mm thick, but {step_mm:.3} mm apart: overlapping slabs, in which small \
+             structures are longer than they are"
+        ))
+    })
 }
 
 fn varying_rescale(slices: &[Slice]) -> Option<Remark> {

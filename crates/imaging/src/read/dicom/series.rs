@@ -3,18 +3,24 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use super::image::{Plane, SeriesKey, Slice};
+use super::image::{PERCENTAGE, Plane, SeriesKey, Slice, TIMES};
 use super::stack::{are_even, are_interleaved, duplicates, in_order};
 use crate::{ImagingError, Orientation, Remark, VoxelGrid};
 
 /// Difference of direction cosines up to which slices are parallel: 0.006 degrees, 0.05 mm over half a metre.
 const PARALLEL: f64 = 1e-4;
 
+/// Modalities of volumes: cone beam CT of angiography systems is XA.
+const MODALITIES: [&str; 2] = ["CT", "XA"];
+
 /// Series of a folder that are listed.
 const LISTED: usize = 40;
 
-/// Difference of pixel spacings up to which they are the same.
-const SAME_SPACING_MM: f64 = 1e-5;
+/// Difference of pixel spacings up to which they are the same: what it makes from one edge of a slice to the other.
+const SAME_EXTENT_MM: f64 = 0.05;
+
+/// Slices at one place that are a series of their own, and no slices that are there twice.
+const AT_ONE_PLACE: usize = 3;
 
 /// Slices of one volume, it may be.
 #[derive(Debug)]
@@ -24,6 +30,18 @@ pub(super) struct Series {
     pub(super) slices: Vec<Slice>,
     /// Copies of files that were left out.
     copies: usize,
+    part: Option<Part>,
+}
+
+/// One of several stacks that a series is taken apart into.
+#[derive(Debug)]
+struct Part {
+    number: usize,
+    of: usize,
+    /// By which it was told from the others.
+    told_by: String,
+    /// Whether all are at the same places.
+    is_phase: bool,
 }
 
 /// The series that slices make, in order of number and UID.
@@ -42,16 +60,7 @@ pub(super) fn all(slices: Vec<Slice>) -> Vec<Series> {
     for groups in by_key.values_mut() {
         groups.sort_by(|a, b| by_direction(&a[0], &b[0]));
     }
-    let mut all: Vec<Series> = by_key
-        .into_values()
-        .flatten()
-        .flat_map(phases)
-        .map(|(slices, copies)| Series {
-            label: String::new(),
-            slices,
-            copies,
-        })
-        .collect();
+    let mut all: Vec<Series> = by_key.into_values().flatten().flat_map(phases).collect();
     let mut with_number: BTreeMap<Option<i64>, usize> = BTreeMap::new();
     for series in &all {
         *with_number.entry(series.key().number).or_default() += 1;
@@ -90,6 +99,7 @@ fn by_direction(a: &Slice, b: &Slice) -> Ordering {
 
 /// Whether two slices may lie in one stack; what has no place is together with its like.
 fn are_parallel(a: &Slice, b: &Slice) -> bool {
+    let [rows, columns] = [a.key.rows, a.key.columns].map(f64::from);
     let (Ok(a), Ok(b)) = (&a.plane, &b.plane) else {
         return a.plane.is_err() && b.plane.is_err();
     };
@@ -97,21 +107,27 @@ fn are_parallel(a: &Slice, b: &Slice) -> bool {
     let [b0, b1] = b.spacing_mm;
     (a.along_row - b.along_row).amax() < PARALLEL
         && (a.down_column - b.down_column).amax() < PARALLEL
-        && (a0 - b0).abs() < SAME_SPACING_MM
-        && (a1 - b1).abs() < SAME_SPACING_MM
+        && (a0 - b0).abs() * rows < SAME_EXTENT_MM
+        && (a1 - b1).abs() * columns < SAME_EXTENT_MM
 }
 
 /// One group of slices, taken apart where it holds a place several times, or is uneven because even stacks lie among
-/// each other, and something tells the stacks apart. With the number of copies left out.
-fn phases(slices: Vec<Slice>) -> Vec<(Vec<Slice>, usize)> {
+/// each other, and something tells the stacks apart.
+fn phases(slices: Vec<Slice>) -> Vec<Series> {
+    let series = |slices, copies, part| Series {
+        label: String::new(),
+        slices,
+        copies,
+        part,
+    };
     let unordered = slices.clone();
     let Ok(slices) = in_order(slices) else {
-        return vec![(unordered, 0)];
+        return vec![series(unordered, 0, None)];
     };
     let (slices, copies) = without_copies(slices);
     let is_doubled = !duplicates(&slices).is_empty();
     if !is_doubled && are_even(&slices) {
-        return vec![(slices, copies)];
+        return vec![series(slices, copies, None)];
     }
     let ways = slices.first().map_or(0, |slice| slice.phase.len());
     for way in 0..ways {
@@ -140,14 +156,35 @@ fn phases(slices: Vec<Slice>) -> Vec<(Vec<Slice>, usize)> {
         });
         let parts: Vec<Vec<Slice>> = parts.into_iter().map(|(_, part)| part).collect();
         if is_doubled || parts.iter().all(|part| are_even(part)) && are_interleaved(&parts) {
-            return parts.into_iter().map(|part| (part, copies)).collect();
+            let of = parts.len();
+            let part = |(at, slices): (usize, Vec<Slice>)| {
+                let part = Part {
+                    number: at + 1,
+                    of,
+                    told_by: told_by(way, slices[0].phase[way].as_deref()),
+                    is_phase: is_doubled,
+                };
+                series(slices, copies, Some(part))
+            };
+            return parts.into_iter().enumerate().map(part).collect();
         }
     }
-    vec![(slices, copies)]
+    vec![series(slices, copies, None)]
 }
 
-/// The first of the ways to tell phases that is a time: it may also differ from one turn of the tube to the next.
-const TIMES: usize = 5;
+/// By what phases are told apart, for people: times of day are not said.
+fn told_by(way: usize, value: Option<&str>) -> String {
+    let value = value.unwrap_or("none");
+    match way {
+        0 => format!("acquisition {value}"),
+        1 | 2 => format!("temporal position {value}"),
+        3 => format!("trigger time {value} ms"),
+        4 => format!("{value} % of the cardiac cycle"),
+        5 => format!("{value} % of the breathing cycle"),
+        PERCENTAGE => format!("{value} %"),
+        _ => "by time".to_owned(),
+    }
+}
 
 fn are_at_the_same_places(parts: &BTreeMap<Option<String>, Vec<Slice>>) -> bool {
     let places = |part: &[Slice]| -> Vec<_> {
@@ -192,8 +229,31 @@ impl Series {
         let is_ct = key
             .modality
             .as_deref()
-            .is_none_or(|modality| modality == "CT");
-        is_ct && !key.is_scout && self.slices[0].plane.is_ok()
+            .is_none_or(|modality| MODALITIES.contains(&modality));
+        is_ct
+            && !key.is_scout
+            && key.made.is_none()
+            && self.slices[0].plane.is_ok()
+            && !self.is_at_one_place()
+    }
+
+    /// Whether both are phases of one series.
+    fn is_phase_of(&self, other: &Self) -> bool {
+        let is_phase = |series: &Self| series.part.as_ref().is_some_and(|part| part.is_phase);
+        is_phase(self) && is_phase(other) && self.key() == other.key()
+    }
+
+    /// Whether it is one place over time, as bolus tracking is.
+    fn is_at_one_place(&self) -> bool {
+        let slices = &self.slices;
+        slices.len() >= AT_ONE_PLACE
+            && slices[0].file.frames == 1
+            && duplicates(slices).len() + 1 == slices.len()
+    }
+
+    /// Whether it is pictures of an angiography system, from one side each.
+    fn is_angiography(&self) -> bool {
+        self.key().modality.as_deref() == Some("XA") && self.slices[0].plane.is_err()
     }
 
     /// For the list of what a folder holds: no more than what tells series apart.
@@ -214,17 +274,78 @@ impl Series {
             words.push(format!("kernel {kernel}"));
         }
         match &key.modality {
+            Some(modality) if modality == "XA" => words.push("modality XA".to_owned()),
             Some(modality) if modality != "CT" => {
                 words.push(format!("modality {modality}, not CT"));
             }
             _ => {}
         }
-        if key.is_scout {
+        if let Some(part) = &self.part {
+            let Part {
+                number,
+                of,
+                told_by,
+                is_phase,
+            } = part;
+            let kind = if *is_phase { "phase" } else { "part" };
+            words.push(format!("{kind} {number} of {of} ({told_by})"));
+        } else if let Some(percent) = &self.slices[0].phase[PERCENTAGE] {
+            words.push(format!("phase {percent} %"));
+        }
+        if let Some(made) = key.made {
+            words.push(made.in_words().to_owned());
+        } else if self.is_angiography() {
+            words.push("X-ray projections".to_owned());
+        } else if self.is_at_one_place() {
+            words.push("at one place (bolus tracking)".to_owned());
+        } else if key.is_scout {
             words.push("a scout".to_owned());
         } else if self.slices[0].plane.is_err() {
             words.push("without a position".to_owned());
         }
         format!("{}: {}", self.label, words.join(", "))
+    }
+
+    /// Refuses what is no volume of a CT, by what it is.
+    fn check(&self) -> Result<(), ImagingError> {
+        let key = self.key();
+        let count = self.slices.len();
+        if key.is_scout {
+            return Err(
+                ImagingError::refused("it is a scout (LOCALIZER), not a volume")
+                    .hint("name the folder or file of the scan"),
+            );
+        }
+        if self.is_angiography() {
+            return Err(ImagingError::refused(format!(
+                "{count} X-ray projections of an angiography system (XA) are not a volume"
+            ))
+            .hint("export its 3D reconstruction (cone beam CT) as CT or X-Ray 3D images, and name that"));
+        }
+        match &key.modality {
+            Some(modality) if !MODALITIES.contains(&modality.as_str()) => {
+                return Err(
+                    ImagingError::refused(format!("the modality is {modality}, not CT"))
+                        .hint("name the folder or file of a CT"),
+                );
+            }
+            _ => {}
+        }
+        if let Some(made) = key.made {
+            return Err(ImagingError::refused(format!(
+                "the slices are {}, which are not Hounsfield units of one place",
+                made.in_words()
+            ))
+            .hint("name the series of the thin slices that they were made from"));
+        }
+        if self.is_at_one_place() {
+            return Err(ImagingError::refused(format!(
+                "all {count} slices are at one place, one after the other: bolus tracking, or a test bolus, is not a \
+                 volume"
+            ))
+            .hint("name the series of the scan itself"));
+        }
+        Ok(())
     }
 
     /// What was left out of it.
@@ -278,25 +399,19 @@ pub(super) fn choose(
             list(&all)
         )));
     }
-    if chosen.key().is_scout {
-        return Err(
-            ImagingError::refused("it is a scout (LOCALIZER), not a volume")
-                .at(format!("series {}", chosen.label))
-                .hint("name the folder or file of the scan"),
-        );
+    chosen
+        .check()
+        .map_err(|problem| problem.at(format!("series {}", chosen.label)))?;
+    if chosen.key().modality.is_none() {
+        remarks.push(Remark::new("the modality is not stated: CT assumed"));
     }
-    match &chosen.key().modality {
-        Some(modality) if modality != "CT" => Err(ImagingError::refused(format!(
-            "the modality is {modality}, not CT"
-        ))
-        .at(format!("series {}", chosen.label))
-        .hint("name the folder or file of a CT")),
-        None => {
-            remarks.push(Remark::new("the modality is not stated: CT assumed"));
-            Ok((chosen, remarks))
-        }
-        Some(_) => Ok((chosen, remarks)),
+    if let Some(part) = chosen.part.as_ref().filter(|part| part.is_phase) {
+        remarks.push(Remark::new(format!(
+            "phase {} of {} ({}): the others are not read",
+            part.number, part.of, part.told_by
+        )));
     }
+    Ok((chosen, remarks))
 }
 
 fn asked_for(all: &[Series], wanted: &str) -> Result<usize, ImagingError> {
@@ -326,10 +441,19 @@ fn only_volume(all: &[Series]) -> Result<usize, ImagingError> {
             .hint(format!("the series are {}", list(all)))),
         _ => {
             let several = if stacks.is_empty() { &volumes } else { &stacks };
-            Err(
-                ImagingError::refused(format!("{} series are possible", several.len()))
-                    .hint(format!("choose one with --series: {}", list(all))),
-            )
+            let what = if several
+                .iter()
+                .all(|at| all[*at].is_phase_of(&all[several[0]]))
+            {
+                format!(
+                    "the series has {} phases (4D): the same places at several times",
+                    several.len()
+                )
+            } else {
+                format!("{} series are possible", several.len())
+            };
+            Err(ImagingError::refused(what)
+                .hint(format!("choose one with --series: {}", list(all))))
         }
     }
 }

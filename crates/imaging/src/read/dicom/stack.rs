@@ -186,9 +186,13 @@ fn grid(plane: &Plane, step_mm: Vector3<f64>, size: [usize; 3]) -> Result<VoxelG
 
 fn same_place(a: &Slice, b: &Slice, height_mm: f64) -> ImagingError {
     if Arc::ptr_eq(&a.file, &b.file) {
+        let why = if a.file.has_frame_groups {
+            "they are of several phases, or of bolus tracking"
+        } else {
+            "no frame has a position of its own"
+        };
         return ImagingError::refused(format!(
-            "frames {} and {} of {} have the same position: they have no positions of their own, or are of several \
-             phases",
+            "frames {} and {} of {} have the same position: {why}",
             a.frame + 1,
             b.frame + 1,
             a.file.frames
@@ -223,10 +227,13 @@ fn single(slices: Vec<Slice>, plane: &Plane, normal: &Vector3<f64>) -> Result<St
         1,
     ];
     let message = match slice.thickness_mm {
-        Some(mm) => format!("there is one slice; its thickness, {mm} mm, is used as slice spacing"),
+        Some(mm) => format!(
+            "there is one slice, which is no volume (to read a series, name its folder): its thickness, {mm} mm, is \
+             used as slice spacing"
+        ),
         None => format!(
-            "there is one slice of unknown thickness: a slice spacing of {ASSUMED_MM} mm is \
-             assumed"
+            "there is one slice of unknown thickness, which is no volume (to read a series, name its folder): a slice \
+             spacing of {ASSUMED_MM} mm is assumed"
         ),
     };
     let step_mm = slice.thickness_mm.unwrap_or(ASSUMED_MM);

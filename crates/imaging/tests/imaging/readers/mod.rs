@@ -10,3 +10,4 @@ mod mgh;
 mod mutated;
 mod nifti;
 mod nrrd;
+mod sent;
