@@ -119,6 +119,8 @@ def main() -> int:
         dicom.compressed(reader, made / "dicom")
         dicom.multi_frame(reader, made / "dicom")
         dicom.folders(reader, made / "dicom")
+        dicom.cone_beam(reader, made / "dicom")
+        dicom.sent(reader, made / "dicom")
         dicom.odd(reader, made / "dicom")
         print(reader.answers - before, "DICOM series answered")
         private(reader.everything_said)

@@ -31,6 +31,8 @@ from pydicom.uid import (
     JPEGLSLossless,
     JPEGLSNearLossless,
     RLELossless,
+    XRay3DAngiographicImageStorage,
+    XRayAngiographicImageStorage,
     generate_uid,
 )
 
@@ -562,6 +564,70 @@ def indexed(reader: Reader, folder: Path) -> None:
     for path in files:
         path.unlink(missing_ok=True)
     refused(reader.one(folder / "DICOMDIR"), "none of the 6 files", "whole disc")
+
+
+def cone_beam(reader: Reader, folder: Path) -> None:
+    """Of angiography systems: volumes as slices and as X-Ray 3D, and what is none."""
+    slices = series(Modality="XA")
+    answer = reader.one(saved(folder / "cone-beam", slices))
+    same(answer, *expected(slices))
+    remarked(answer, "cone beam CT: its values are not calibrated")
+    whole = enhanced(slices)
+    whole.SOPClassUID = whole.file_meta.MediaStorageSOPClassUID = XRay3DAngiographicImageStorage
+    whole.Modality, whole.ImageType = "XA", ["ORIGINAL", "PRIMARY", "VOLUME", "NONE"]
+    whole.save_as(folder / "x-ray-3d.dcm", enforce_file_format=True)
+    answer = reader.one(folder / "x-ray-3d.dcm")
+    same(answer, *expected(slices))
+    remarked(answer, "cone beam CT: its values are not calibrated")
+    run = slice_of(0, stored_slices()[0], (0, 0, 0), Modality="XA", NumberOfFrames=4)
+    run.SOPClassUID = run.file_meta.MediaStorageSOPClassUID = XRayAngiographicImageStorage
+    del run.ImagePositionPatient, run.ImageOrientationPatient, run.PixelSpacing
+    run.PixelData = run.PixelData * 4
+    run.save_as(folder / "run.dcm", enforce_file_format=True)
+    refused(reader.one(folder / "run.dcm"), "4 X-ray projections", "3D reconstruction")
+
+
+def sent(reader: Reader, folder: Path) -> None:
+    """What is no plain series of one volume, called what it is."""
+    gated = [series(SeriesDescription=f"{NAME} gated {percent}%") for percent in range(0, 100, 10)]
+    path = saved(folder / "gated", [each for phase in gated for each in phase])
+    refused(reader.one(path), "10 phases (4D)", "phase 1 of 10 (0 %)", "phase 10 of 10 (90 %)")
+    answer = reader.one(path, "--series", "3.4")
+    same(answer, *expected(gated[3]))
+    remarked(answer, "phase 4 of 10 (30 %)")
+
+    scan = series()
+    bolus = [
+        slice_of(
+            at, stored, (0, 0, 0), SeriesInstanceUID="1.2.3.6", SeriesNumber=2, AcquisitionTime=f"1015{at:02}.5"
+        )
+        for at, stored in enumerate(stored_slices(count=12))
+    ]
+    refused(reader.one(saved(folder / "bolus", bolus)), "all 12 slices are at one place", "bolus tracking")
+    mip = series(
+        SeriesInstanceUID="1.2.3.7",
+        SeriesNumber=7,
+        ImageType=["DERIVED", "SECONDARY", "AXIAL", "CT_SOM5 MIP"],
+        SliceThickness=10,
+    )
+    refused(reader.one(saved(folder / "mip", mip)), "maximum intensity projections (MIP)", "thin slices")
+    answer = reader.one(saved(folder / "study", [*bolus, *scan, *mip]))
+    same(answer, *expected(scan))
+    remarked(answer, "bolus tracking", "maximum intensity projections")
+
+    (folder / "study" / "s999").touch()
+    refused(reader.one(folder / "study"), "s999", "0 bytes", "slices are missing")
+    (folder / "no-bytes").mkdir()
+    for at in range(3):
+        (folder / "no-bytes" / f"IM{at}").touch()
+    refused(reader.one(folder / "no-bytes"), "all 3 files are empty (0 bytes)")
+
+    rounded = series()
+    for each in rounded[1::2]:
+        each.PixelSpacing = [0.75002, 0.50002]
+    same(reader.one(saved(folder / "spacings", rounded)), *expected(rounded), tolerance_mm=2e-5 * COLUMNS)
+    answer = reader.one(saved(folder / "slabs", series(SliceThickness=10)))
+    remarked(answer, "10 mm thick, but 1.250 mm apart")
 
 
 def folders(reader: Reader, folder: Path) -> None:
