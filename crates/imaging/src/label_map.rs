@@ -30,6 +30,14 @@ pub(crate) fn given_structures(
     remarks: &mut Vec<Remark>,
 ) -> Result<Vec<Given>, ImagingError> {
     check_same_grid(&map.grid, grid)?;
+    if map.names.len() > MOST_LABELS {
+        return Err(ImagingError::refused(format!(
+            "it has {} labels, at most {MOST_LABELS} are read",
+            map.names.len()
+        ))
+        .at("label map")
+        .hint("is it an image or a probability map instead of a label map?"));
+    }
     let mut structures: BTreeMap<String, (Structure, Vec<u16>)> = BTreeMap::new();
     let mut unknown = Vec::new();
     for (label, name) in &map.names {
@@ -73,6 +81,9 @@ const LUNG_VESSELS: &str = "lung_vessels";
 
 /// First number of what was found beside a label map from elsewhere, unless that uses it.
 const FIRST_OWN: u16 = 1000;
+
+/// Most labels of a map from elsewhere: what was found beside it has numbers of its own.
+const MOST_LABELS: usize = 60_000;
 
 /// A hundredth of a voxel at the corners: what rounding of headers to single precision leaves.
 const SAME_PLACE: f64 = 0.01;
@@ -314,7 +325,11 @@ pub(crate) fn completed_labels(
             *label = numbers[usize::from(*own)];
         }
     }
-    let unused = (FIRST_LESION..FIRST_OWN).filter(|&label| !is_used[usize::from(label)]);
+    for &number in &numbers {
+        is_used[usize::from(number)] = true;
+    }
+    // After those of others, where a map leaves none before.
+    let unused = (FIRST_LESION..=u16::MAX).filter(|&label| !is_used[usize::from(label)]);
     for (label, lesion) in unused.zip(lesions) {
         paint(&mut map, &lesion.bounds, &lesion.mask, label);
         map.names.push((label, lesion.name.clone()));

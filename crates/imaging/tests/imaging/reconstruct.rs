@@ -898,3 +898,85 @@ fn lesions_of_a_label_map_are_lesions_with_its_outline() {
             .all(|(_, name)| name != "lung_nodules")
     );
 }
+
+/// 150 blocks of 8 voxels, one of 27 and one of a single voxel, 4 voxels apart in the right half.
+fn noise([i, j, k]: [usize; 3]) -> bool {
+    const PER_ROW: usize = 16;
+    let (block, at) = ([i / 4, j / 4], [i % 4, j % 4, k % 4]);
+    let number = block[1] * PER_ROW + block[0];
+    let side = match number {
+        0 => 3,
+        1 => 1,
+        _ => 2,
+    };
+    block[0] < PER_ROW && number < 152 && k / 4 == 5 && at.iter().all(|&each| each < side)
+}
+
+#[test]
+fn of_many_lesions_of_a_map_the_largest_are_taken() {
+    let volume = render(&chest(), grid());
+    let [nx, ny, _] = SIZE;
+    let label = |at: usize| u16::from(noise([at % nx, at / nx % ny, at / (nx * ny)]));
+    let mut options = options();
+    let labels: Vec<u16> = (0..volume.hu.len()).map(label).collect();
+    // The seed is in the last of all.
+    let index = [28.0, 36.0, 20.0];
+    let point_m = volume.grid.ct_from_index(&Point3::from(index));
+    options.lesions = vec![LesionSeed {
+        name: "pointed_at".to_owned(),
+        point_m,
+    }];
+    options.labels = Some(LabelMap {
+        labels,
+        grid: volume.grid.clone(),
+        names: vec![(1, "tumor".to_owned())],
+    });
+    let made = run(&volume, &options).unwrap();
+    assert_eq!(made.lesions.len(), 100);
+    let said = remarks(&made);
+    assert!(said.contains("it has 151 separate lesions"), "{said}");
+    assert!(said.contains("51 are omitted"), "{said}");
+    assert!(
+        said.contains("1 parts of lesions with less than 8"),
+        "{said}"
+    );
+    let has = |name: &str| made.lesions.iter().any(|each| each.lesion.name == name);
+    assert!(has("pointed_at"));
+    // In the order of the data, which the 27 voxels begin.
+    let first = &made.lesions[0].lesion;
+    assert_eq!((first.name.as_str(), first.mask.count()), ("tumor_1", 27));
+    let cancelled = AtomicBool::new(true);
+    let stopped = reconstruct(&volume, &options, 1, &cancelled, &|_, _| {});
+    assert_eq!(stopped.unwrap_err(), ImagingError::Interrupted);
+}
+
+#[test]
+fn lesions_have_labels_where_a_map_uses_all_below_a_thousand() {
+    let volume = render(&chest(), grid());
+    let count = volume.hu.len();
+    let mut labels = vec![0; count];
+    // Outside of the body, where they hide nothing.
+    for (label, place) in (100..1100).zip(&mut labels) {
+        *place = label;
+    }
+    let mut options = options();
+    options.lesions = vec![seed("nodule", NODULE_MM)];
+    options.labels = Some(LabelMap {
+        labels,
+        grid: volume.grid.clone(),
+        names: (100..1100)
+            .map(|label| (label, format!("parcel {label}")))
+            .collect(),
+    });
+    let made = run(&volume, &options).unwrap();
+    let voxels = voxels_of(&made, &["nodule"])
+        .into_iter()
+        .filter(|&is| is)
+        .count();
+    assert_eq!(voxels, made.lesions[0].lesion.mask.count());
+    let bone = voxels_of(&made, &["bone"])
+        .into_iter()
+        .filter(|&is| is)
+        .count();
+    assert!(bone > 1000, "{bone}");
+}

@@ -130,7 +130,8 @@ impl Classes {
             return Class::new(name, Kind::Lesion);
         }
         let is_off = off.iter().any(|each| each == name);
-        let tissue = structure_of(name).map(|structure| structure.tissue);
+        let structure = structure_of(name);
+        let tissue = structure.as_ref().map(|structure| structure.tissue);
         if is_off && tissue == Some(SurfaceTissue::Beside) {
             return Class::new(name, Kind::Outside);
         }
@@ -154,7 +155,7 @@ impl Classes {
                 ..Class::new(name, Kind::Organ)
             };
         }
-        let Some(structure) = structure_of(name) else {
+        let Some(structure) = structure else {
             return Class::new(name, Kind::Soft);
         };
         let kind = match structure.tissue {
