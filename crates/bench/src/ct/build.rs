@@ -39,7 +39,8 @@ pub struct KnownMarkers {
 /// A label map from elsewhere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GivenLabels {
-    /// A label map or segmentation in any format that is read, on the voxels of the volume.
+    /// A label map or segmentation in any format that is read, or a folder with a mask in each file, on the voxels of the
+    /// volume.
     pub file: PathBuf,
     /// Which label is called what, where the file does not say it.
     pub names: Vec<(u16, String)>,
@@ -300,8 +301,17 @@ fn labels_of(
         ..ReadOptions::default()
     };
     let place = given.file.display().to_string();
-    let read = read_labels(&given.file, grid, &options, control.cancel)
-        .map_err(|error| error.at(place.clone()))?;
+    let within = |error: ImagingError| match &error {
+        // A file of a folder, or an element of the file.
+        ImagingError::Refused {
+            place: Some(inner), ..
+        } => {
+            let place = format!("{place}: {inner}");
+            error.at(place)
+        }
+        _ => error.at(place.clone()),
+    };
+    let read = read_labels(&given.file, grid, &options, control.cancel).map_err(within)?;
     remarks.extend(
         read.remarks
             .into_iter()

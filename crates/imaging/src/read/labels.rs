@@ -5,27 +5,27 @@ use std::sync::atomic::AtomicBool;
 
 use super::archive::{self, Unpacked};
 use super::format::{Format, format_of};
+use super::order::Order;
+use super::painted::{not_found, nothing_found};
 use super::voxels::StoredVoxels;
-use super::{ReadOptions, dicom, zeroed};
+use super::{ReadOptions, dicom, label_folder};
 use crate::{ImagingError, LabelMap, Remark, VoxelGrid};
-
-/// Distance between corners up to which two grids are the same.
-const SAME_CORNERS_M: f64 = 1e-5;
 
 /// A label map on the CT's grid, and what is odd about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadLabels {
-    /// Labels of the CT's voxels.
+    /// Labels of the CT's voxels, with the names of those that have any.
     pub labels: LabelMap,
     /// What is odd.
     pub remarks: Vec<Remark>,
 }
 
-/// Reads a label map of the CT on `grid` from a DICOM segmentation or any format of volumes.
+/// Reads a label map of the CT on `grid` from a DICOM segmentation, any format of volumes, or a folder with a mask of one
+/// structure in each file.
 ///
 /// Its voxels must be the CT's, to 0.01 mm at the corners; axes may run the other way or be in another order. It may
 /// have a part of the CT's voxels, as 3D Slicer crops segmentations: the others have no label. Where segments overlap,
-/// the last one counts.
+/// the last one counts; of masks in a folder, the one that is more specific.
 pub fn read_labels(
     path: &Path,
     grid: &VoxelGrid,
@@ -34,13 +34,19 @@ pub fn read_labels(
 ) -> Result<ReadLabels, ImagingError> {
     let unpacked = archive::unpacked(path, options, cancel)?;
     let path = unpacked.as_ref().map_or(path, Unpacked::path);
-    match format_of(path)? {
+    let masks = label_folder::masks(path)?;
+    if !masks.is_empty() {
+        let (labels, remarks) = label_folder::read(&masks, grid, options, cancel)?;
+        return Ok(ReadLabels { labels, remarks });
+    }
+    let read = match format_of(path)? {
         Format::Dicom => {
             let (labels, remarks) = dicom::read_segmentation(path, grid, options, cancel)?;
-            Ok(ReadLabels { labels, remarks })
+            ReadLabels { labels, remarks }
         }
-        Format::Stored(open) => of_stored(open(path, options)?, grid, options, cancel),
-    }
+        Format::Stored(open) => of_stored(open(path, options)?, grid, options, cancel)?,
+    };
+    with_names_of_all(read)
 }
 
 fn of_stored(
@@ -51,7 +57,7 @@ fn of_stored(
 ) -> Result<ReadLabels, ImagingError> {
     let mut remarks = stored.header().remarks.clone();
     let own = stored.header().grid.clone();
-    let segment_names = stored.header().segments.names();
+    let names = stored.header().segments.names();
     let order = Order::between(&own, grid)?;
     let (values, of_bytes) = stored.labels(options, cancel)?;
     remarks.extend(of_bytes);
@@ -61,17 +67,6 @@ fn of_stored(
         order.applied(&values, grid, options)?
     };
     remarks.extend(order.part(grid));
-    let mut is_used = vec![false; 1 << 16];
-    for label in &labels {
-        is_used[usize::from(*label)] = true;
-    }
-    let mut names = segment_names;
-    for (label, _) in &names {
-        is_used[usize::from(*label)] = false;
-    }
-    let nameless = (1..=u16::MAX).filter(|label| is_used[usize::from(*label)]);
-    names.extend(nameless.map(|label| (label, format!("label {label}"))));
-    names.sort();
     Ok(ReadLabels {
         labels: LabelMap {
             grid: grid.clone(),
@@ -82,159 +77,26 @@ fn of_stored(
     })
 }
 
-/// Which axis of another grid runs along each axis of ours, whether the other way, and from which voxel on.
-#[derive(Debug, PartialEq, Eq)]
-struct Order {
-    /// Of the other grid, along its axes.
-    size: [usize; 3],
-    axes: [(usize, bool); 3],
-    /// The voxel of ours at which the other grid begins.
-    first: [usize; 3],
-}
-
-impl Order {
-    fn between(own: &VoxelGrid, wanted: &VoxelGrid) -> Result<Self, ImagingError> {
-        let permutations = [
-            [0, 1, 2],
-            [1, 0, 2],
-            [0, 2, 1],
-            [2, 1, 0],
-            [1, 2, 0],
-            [2, 0, 1],
-        ];
-        let mut nearest_m = f64::INFINITY;
-        for permutation in permutations {
-            let size = permutation.map(|axis| own.size()[axis]);
-            if (0..3).any(|axis| size[axis] > wanted.size()[axis]) {
-                continue;
-            }
-            for flips in 0..8 {
-                let mut order = Self {
-                    size: own.size(),
-                    axes: [0, 1, 2].map(|axis| (permutation[axis], flips >> axis & 1 == 1)),
-                    first: [0; 3],
-                };
-                order.first = order.nearest_first(own, wanted);
-                let apart_m = order.farthest_corners_m(own, wanted);
-                if apart_m <= SAME_CORNERS_M {
-                    return Ok(order);
-                }
-                if size == wanted.size() {
-                    nearest_m = nearest_m.min(apart_m);
-                }
-            }
-        }
-        let [a, b] = [own, wanted].map(|grid| words(grid.size()));
-        let what = if nearest_m.is_finite() {
-            format!(
-                "its voxel corners are up to {:.3} mm from the CT's",
-                nearest_m * 1e3
-            )
-        } else {
-            format!("it has {a} voxels, the CT {b}")
-        };
-        Err(
-            ImagingError::refused(format!("the label map belongs to another volume: {what}"))
-                .hint("export it in the geometry of the CT"),
-        )
+/// With a name for each label that voxels have, and none for others: a structure without a voxel was not found, and is
+/// not to be taken for one that is there.
+fn with_names_of_all(mut read: ReadLabels) -> Result<ReadLabels, ImagingError> {
+    let LabelMap { labels, names, .. } = &mut read.labels;
+    let mut is_used = vec![false; 1 << 16];
+    for label in &*labels {
+        is_used[usize::from(*label)] = true;
     }
-
-    /// Voxels of the other grid along our axes.
-    fn lengths(&self) -> [usize; 3] {
-        self.axes.map(|(axis, _)| self.size[axis])
+    is_used[0] = false;
+    if !is_used.contains(&true) {
+        return Err(nothing_found());
     }
-
-    /// The voxel of ours that is nearest to where the other grid begins, so that all of it is in ours.
-    fn nearest_first(&self, own: &VoxelGrid, wanted: &VoxelGrid) -> [usize; 3] {
-        let index = wanted.index_from_ct(&place(own, self.index([0; 3])));
-        let lengths = self.lengths();
-        [0, 1, 2].map(|axis| {
-            let most = (wanted.size()[axis] - lengths[axis]) as f64;
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "within the grid; 0 where it is not finite"
-            )]
-            let first = index[axis].round().clamp(0.0, most) as usize;
-            first
-        })
+    let empty = names.extract_if(.., |(label, _)| !is_used[usize::from(*label)]);
+    let empty: Vec<String> = empty.map(|(_, name)| name).collect();
+    read.remarks.extend(not_found(&empty));
+    for (label, _) in &*names {
+        is_used[usize::from(*label)] = false;
     }
-
-    /// Index in the other grid of one in ours, counted from its first voxel there.
-    fn index(&self, index: [usize; 3]) -> [usize; 3] {
-        let mut other = [0; 3];
-        for ((axis, is_flipped), at) in self.axes.into_iter().zip(index) {
-            other[axis] = if is_flipped {
-                self.size[axis] - 1 - at
-            } else {
-                at
-            };
-        }
-        other
-    }
-
-    fn farthest_corners_m(&self, own: &VoxelGrid, wanted: &VoxelGrid) -> f64 {
-        let lengths = self.lengths();
-        (0..8)
-            .map(|corner| {
-                let at = [0, 1, 2].map(|axis| {
-                    if corner >> axis & 1 == 1 {
-                        lengths[axis] - 1
-                    } else {
-                        0
-                    }
-                });
-                let ours = [0, 1, 2].map(|axis| self.first[axis] + at[axis]);
-                (place(own, self.index(at)) - place(wanted, ours)).norm()
-            })
-            .fold(0.0, f64::max)
-    }
-
-    fn is_same(&self, grid: &VoxelGrid) -> bool {
-        self.axes == [(0, false), (1, false), (2, false)] && self.size == grid.size()
-    }
-
-    fn applied(
-        &self,
-        values: &[u16],
-        grid: &VoxelGrid,
-        options: &ReadOptions,
-    ) -> Result<Vec<u16>, ImagingError> {
-        options.check_memory(grid, (grid.len() * size_of::<u16>()) as u64)?;
-        let mut labels = zeroed(grid.len())?;
-        let [columns, rows, slices] = self.lengths();
-        for k in 0..slices {
-            for j in 0..rows {
-                let start = grid.offset([self.first[0], self.first[1] + j, self.first[2] + k]);
-                for (i, label) in labels[start..start + columns].iter_mut().enumerate() {
-                    let [a, b, c] = self.index([i, j, k]);
-                    *label = values[(c * self.size[1] + b) * self.size[0] + a];
-                }
-            }
-        }
-        Ok(labels)
-    }
-
-    /// That the other grid has a part of our voxels.
-    fn part(&self, grid: &VoxelGrid) -> Option<Remark> {
-        let lengths = self.lengths();
-        (lengths != grid.size()).then(|| {
-            let [i, j, k] = self.first;
-            Remark::new(format!(
-                "it has {} of the CT's {} voxels, from voxel {i}, {j}, {k} on: the others have no label",
-                words(lengths),
-                words(grid.size())
-            ))
-        })
-    }
-}
-
-fn words([i, j, k]: [usize; 3]) -> String {
-    format!("{i} x {j} x {k}")
-}
-
-/// Of a voxel, in `ct`.
-fn place(grid: &VoxelGrid, index: [usize; 3]) -> nalgebra::Point3<f64> {
-    let index = index.map(|each| each as f64);
-    grid.ct_from_index(&nalgebra::Point3::from(nalgebra::Vector3::from(index)))
+    let nameless = (1..=u16::MAX).filter(|label| is_used[usize::from(*label)]);
+    names.extend(nameless.map(|label| (label, format!("label {label}"))));
+    names.sort();
+    Ok(read)
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::bytes::ByteStream;
 use super::scalar::{Converter, Rescale, Stored, Tally};
-use super::segments::{Painter, Segments};
+use super::segments::Segments;
 use super::{ReadOptions, reserved, zeroed};
 use crate::{ImagingError, Remark, VoxelGrid};
 
@@ -117,28 +117,82 @@ impl StoredVoxels {
     ) -> Result<(Vec<u16>, Vec<Remark>), ImagingError> {
         let count = self.header.grid.len();
         self.check_size(count * size_of::<u16>(), options)?;
-        let mut labels = reserved(count)?;
-        let (stored, rescale) = (self.header.stored, self.header.rescale);
         let mut painter = self.header.segments.painter();
-        let mut remarks = self.each_piece(cancel, |bytes, _| {
+        if let Some(painter) = &mut painter {
+            let mut labels = reserved(count)?;
+            let mut at = 0;
+            // Values of all layers, with what is 0 between them.
+            let mut remarks = self.each_value(cancel, |next, value| {
+                labels.extend((at..next).filter_map(|_| painter.take(0)));
+                labels.extend(painter.take(value));
+                at = next + 1;
+            })?;
+            let values = count * self.header.segments.layers();
+            labels.extend((at..values).filter_map(|_| painter.take(0)));
+            remarks.extend(painter.remarks());
+            return Ok((labels, remarks));
+        }
+        let mut labels = zeroed(count)?;
+        let remarks = self.each_value(cancel, |at, label| labels[at] = label)?;
+        Ok((labels, remarks))
+    }
+
+    /// Calls `take` with the place in the data and the label of each voxel that has one.
+    pub(super) fn each_label(
+        mut self,
+        options: &ReadOptions,
+        cancel: &AtomicBool,
+        take: impl FnMut(usize, u16),
+    ) -> Result<Vec<Remark>, ImagingError> {
+        let layers = self.header.segments.layers();
+        if layers > 1 {
+            return Err(ImagingError::refused(format!(
+                "it has {layers} layers, the mask of one structure has one"
+            ))
+            .hint("name a segmentation by its file, not by its folder"));
+        }
+        self.check_size(0, options)?;
+        self.each_value(cancel, take)
+    }
+
+    /// Values that are not 0, with their places in the data.
+    fn each_value(
+        &mut self,
+        cancel: &AtomicBool,
+        mut take: impl FnMut(usize, u16),
+    ) -> Result<Vec<Remark>, ImagingError> {
+        /// Bytes that are looked at together: most of a mask is 0. A whole number of values of any type.
+        const LOOK: usize = 1 << 10;
+        let (stored, rescale) = (self.header.stored, self.header.rescale);
+        let is_zero_nothing = rescale.intercept == 0.0;
+        let width = stored.kind.bytes();
+        let mut at = 0;
+        self.each_piece(cancel, |bytes, _| {
             let mut wrong = None;
-            stored.each(bytes, |number| {
-                let value = number * rescale.slope + rescale.intercept;
-                let is_label = (0.0..=f64::from(u16::MAX)).contains(&value) && value.fract() == 0.0;
-                if !is_label {
-                    wrong = wrong.or(Some(value));
+            for some in bytes.chunks(LOOK) {
+                if is_zero_nothing && some.iter().all(|byte| *byte == 0) {
+                    at += some.len() / width;
+                    continue;
                 }
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "checked above"
-                )]
-                let label = value as u16;
-                match &mut painter {
-                    None => labels.push(label),
-                    Some(painter) => labels.extend(painter.take(label)),
-                }
-            });
+                stored.each(some, |number| {
+                    let value = number * rescale.slope + rescale.intercept;
+                    let is_label =
+                        (0.0..=f64::from(u16::MAX)).contains(&value) && value.fract() == 0.0;
+                    if !is_label {
+                        wrong = wrong.or(Some(value));
+                    }
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "checked above"
+                    )]
+                    let label = value as u16;
+                    if label != 0 {
+                        take(at, label);
+                    }
+                    at += 1;
+                });
+            }
             match wrong {
                 None => Ok(()),
                 Some(value) => Err(ImagingError::refused(format!(
@@ -147,9 +201,7 @@ impl StoredVoxels {
                 ))
                 .hint("is it the scan or a probability map instead of a label map?")),
             }
-        })?;
-        remarks.extend(painter.iter().flat_map(Painter::remarks));
-        Ok((labels, remarks))
+        })
     }
 
     /// Refuses what the file cannot hold, and what memory should not, before any memory is taken.

@@ -175,3 +175,82 @@ fn a_segmentation_of_another_place_is_refused() {
     let said = refusal(labels_as("ct.dcm", &Slice::at(0.0).bytes(), &ct()));
     assert!(said.contains("not a segmentation"), "{said}");
 }
+
+/// The CT's file as a mask, with 1 at these voxels.
+fn mask(voxels: &[usize]) -> Vec<u8> {
+    let mut file = nifti(1, false);
+    for index in 0..SIZE.iter().product::<usize>() {
+        let value = i16::from(voxels.contains(&index));
+        file[352 + 2 * index..][..2].copy_from_slice(&value.to_le_bytes());
+    }
+    file
+}
+
+fn folder(files: &[(&str, Vec<u8>)]) -> Result<ReadLabels, ImagingError> {
+    let grid = read_as("a.nii", &nifti(1, false)).unwrap().volume.grid;
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in files {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    read_labels(
+        folder.path(),
+        &grid,
+        &ReadOptions::default(),
+        &AtomicBool::new(false),
+    )
+}
+
+#[test]
+fn a_folder_of_masks_is_one_label_map() {
+    // Columns the other way: voxels 9 and 8 are 5 and 6 of the CT.
+    let mut flipped = mask(&[9, 8]);
+    flipped[280..284].copy_from_slice(&0.5_f32.to_le_bytes());
+    flipped[292..296].copy_from_slice(&8.0_f32.to_le_bytes());
+    let read = folder(&[
+        ("lung_upper_lobe_left.nii", mask(&[0, 1, 2, 3])),
+        ("lung_nodules.nii", mask(&[1])),
+        ("rib_left_7.nii", flipped),
+        ("spleen.nii", mask(&[])),
+        ("statistics.json", b"{}".to_vec()),
+    ])
+    .unwrap();
+    // Numbers in the order of the names; the nodule hides the lobe.
+    assert_eq!(read.labels.labels[..8], [2, 1, 2, 2, 0, 3, 3, 0]);
+    let names = [
+        (1, "lung_nodules"),
+        (2, "lung_upper_lobe_left"),
+        (3, "rib_left_7"),
+    ];
+    let names = names.map(|(label, name)| (label, name.to_owned()));
+    assert_eq!(read.labels.names, names);
+    let said: Vec<&str> = read.remarks.iter().map(|it| &*it.message).collect();
+    assert!(said[0].contains("masks of 4 structures"), "{said:?}");
+    assert!(said[1].starts_with("1 voxels are in several"), "{said:?}");
+    assert!(
+        said[2].contains("nothing was found of `spleen`"),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn what_is_no_mask_of_the_ct_is_refused_by_the_name_of_its_file() {
+    let mut elsewhere = mask(&[3]);
+    elsewhere[292..296].copy_from_slice(&10.1_f32.to_le_bytes());
+    for (bytes, word) in [
+        (elsewhere, "0.100 mm from the CT's"),
+        (labelled_twice(), "several labels, 7 and 8"),
+        (nifti(1, false), "-1000 is not a label"),
+        (super::made::layered_nrrd(), "2 layers"),
+    ] {
+        let said = refusal(folder(&[("aorta.nii", mask(&[0])), ("heart.nii", bytes)]));
+        assert!(said.contains("heart.nii") && said.contains(word), "{said}");
+    }
+    let said = refusal(folder(&[("aorta.nii", mask(&[]))]));
+    assert!(said.contains("no voxel has a label"), "{said}");
+}
+
+fn labelled_twice() -> Vec<u8> {
+    let mut file = labelled();
+    file[352..354].copy_from_slice(&8_i16.to_le_bytes());
+    file
+}

@@ -1,0 +1,159 @@
+//! A folder with a mask of one structure in each file, as TotalSegmentator writes them.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use super::format::{Format, format_of};
+use super::order::Order;
+use super::painted::{Painted, painting_order};
+use super::{ReadOptions, unreadable};
+use crate::{ImagingError, LabelMap, Remark, VoxelGrid};
+
+/// How the names of masks end; `.gz` may follow.
+const ENDS: [&str; 7] = [".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".mgh", ".mgz"];
+
+/// Most files of a folder.
+const MOST_FILES: usize = 4096;
+
+/// A file, and the name of its structure.
+#[derive(Debug)]
+pub(super) struct MaskFile {
+    path: PathBuf,
+    name: String,
+}
+
+/// The masks of a folder, in the order of their names; none if it is no folder, or has no volume in it.
+pub(super) fn masks(path: &Path) -> Result<Vec<MaskFile>, ImagingError> {
+    let mut masks = Vec::new();
+    if !path.is_dir() {
+        return Ok(masks);
+    }
+    for entry in path.read_dir().map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        if let Some(name) = structure_name(&path).filter(|_| path.is_file()) {
+            masks.push(MaskFile { path, name });
+        }
+    }
+    if masks.len() > MOST_FILES {
+        return Err(ImagingError::refused(format!(
+            "the folder has {} volumes, at most {MOST_FILES} masks are read",
+            masks.len()
+        ))
+        .hint("name the folder of one segmentation"));
+    }
+    masks.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(masks)
+}
+
+/// The name of a file without what its format adds.
+fn structure_name(path: &Path) -> Option<String> {
+    let name = path.file_name()?.to_str()?;
+    let lower = name.to_ascii_lowercase();
+    let bare = lower.strip_suffix(".gz").unwrap_or(&lower);
+    let bare = ENDS.iter().find_map(|end| bare.strip_suffix(end))?;
+    let bare = bare.strip_suffix(".seg").unwrap_or(bare);
+    // Programs leave hidden files behind.
+    let is_shown = !bare.is_empty() && !bare.starts_with('.');
+    is_shown.then(|| name.get(..bare.len()).unwrap_or(bare).to_owned())
+}
+
+/// Reads the masks one after another; the label of each is its number, from 1.
+pub(super) fn read(
+    masks: &[MaskFile],
+    grid: &VoxelGrid,
+    options: &ReadOptions,
+    cancel: &AtomicBool,
+) -> Result<(LabelMap, Vec<Remark>), ImagingError> {
+    let names: Vec<String> = masks.iter().map(|mask| mask.name.clone()).collect();
+    let mut painted = Painted::new(grid, masks.len(), options)?;
+    let mut remarks = Vec::new();
+    for at in painting_order(&names) {
+        let file = masks[at].path.file_name().unwrap_or_default();
+        let file = file.to_string_lossy().into_owned();
+        let of_file = paint(&masks[at].path, at, &mut painted, grid, options, cancel)
+            .map_err(|error| error.at(file.clone()))?;
+        for mut remark in of_file {
+            remark.message = format!("{file}: {}", remark.message);
+            remarks.push(remark);
+        }
+    }
+    remarks.insert(
+        0,
+        Remark::new(format!(
+            "a folder with masks of {} structures, named by their files",
+            masks.len()
+        )),
+    );
+    let (map, of_map) = painted.finish(grid, names)?;
+    remarks.extend(of_map);
+    Ok((map, remarks))
+}
+
+/// Paints one mask: all its voxels that are not 0, which have one value.
+fn paint(
+    path: &Path,
+    structure: usize,
+    painted: &mut Painted,
+    grid: &VoxelGrid,
+    options: &ReadOptions,
+    cancel: &AtomicBool,
+) -> Result<Vec<Remark>, ImagingError> {
+    let Format::Stored(open) = format_of(path)? else {
+        return Err(
+            ImagingError::refused("it is DICOM, although it is not named so")
+                .hint("name it by itself, or convert it to NIfTI"),
+        );
+    };
+    let stored = open(path, options)?;
+    let mut remarks = stored.header().remarks.clone();
+    let own = stored.header().grid.clone();
+    let order = Order::between(&own, grid)?;
+    let (first, steps) = order.steps(grid);
+    let [nx, ny, _] = own.size();
+    let (mut value, mut other) = (0, 0);
+    let of_bytes = stored.each_label(options, cancel, |at, label| {
+        if value == 0 {
+            value = label;
+        } else if value != label {
+            other = label;
+        }
+        let index = [at % nx, at / nx % ny, at / (nx * ny)];
+        let step: isize = (0..3)
+            .map(|axis| index[axis].cast_signed() * steps[axis])
+            .sum();
+        painted.paint(first.wrapping_add_signed(step), structure);
+    })?;
+    if other != 0 {
+        return Err(ImagingError::refused(format!(
+            "it has several labels, {} and {} among them: in a folder each file has the mask of one structure",
+            value.min(other),
+            value.max(other)
+        ))
+        .hint("name a label map with all structures by its file, not by its folder"));
+    }
+    remarks.extend(of_bytes);
+    remarks.extend(order.part(grid));
+    Ok(remarks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn structures_are_named_by_files_without_their_format() {
+        for (file, name) in [
+            ("rib_left_7.nii.gz", Some("rib_left_7")),
+            ("Lung.NII", Some("Lung")),
+            ("Heart.seg.nrrd", Some("Heart")),
+            ("aorta.mha", Some("aorta")),
+            ("statistics.json", None),
+            (".nii.gz", None),
+            ("._rib_left_7.nii.gz", None),
+            ("rib_left_7.gz", None),
+        ] {
+            let found = structure_name(Path::new(file));
+            assert_eq!(found.as_deref(), name, "{file}");
+        }
+    }
+}
