@@ -1,4 +1,4 @@
-//! Names of the labels of a NIfTI label map, which has none itself.
+//! Names of the labels of a label map, in a file of their own.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,11 +1,12 @@
 //! The header: 348 bytes of NIfTI-1, 540 of NIfTI-2.
 
+use super::label_table;
 use super::orientation::{self, Placement};
 use super::version::{BYTES_1, BYTES_2, version_of};
 use crate::read::bytes::ByteStream;
 use crate::read::fields::Fields;
 use crate::read::scalar::{Kind, Rescale, Stored};
-use crate::read::segments::Segments;
+use crate::read::segments::{Segment, Segments};
 use crate::read::voxels::Header;
 use crate::read::{DAMAGED, ReadOptions};
 use crate::{ImagingError, Remark};
@@ -38,7 +39,17 @@ pub(super) fn read(
         bytes: &bytes[..wanted],
         is_big_endian,
     };
-    parse(&fields, version, options)
+    let (mut header, is_pair) = parse(&fields, version, options)?;
+    let end = if is_pair {
+        u64::MAX
+    } else {
+        header.data_offset
+    };
+    let names = label_table::names(stream, end, is_big_endian, &mut header.remarks)?;
+    let segments = names.into_iter();
+    let segments = segments.map(|(label, name)| Segment::new(name, 0, label));
+    header.segments = Segments::new(1, segments.collect(), &mut header.remarks)?;
+    Ok((header, is_pair))
 }
 
 fn parse(

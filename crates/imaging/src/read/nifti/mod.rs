@@ -1,9 +1,10 @@
 //! NIfTI-1 and -2: `.nii`, `.nii.gz`, and `.hdr` beside `.img`.
 //!
 //! Free texts of the header (`descrip`, `db_name`, `aux_file`, `intent_name`) are never read: some writers put
-//! names there.
+//! names there. Of extensions, only a table of label names is.
 
 mod header;
+mod label_table;
 mod orientation;
 mod pair;
 mod version;

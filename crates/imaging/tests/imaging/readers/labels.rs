@@ -254,3 +254,44 @@ fn labelled_twice() -> Vec<u8> {
     file[352..354].copy_from_slice(&8_i16.to_le_bytes());
     file
 }
+
+/// With extensions before the voxels: one of AFNI with a name in it, and a table of labels.
+fn with_table(mut file: Vec<u8>, table: &str) -> Vec<u8> {
+    let mut extensions = Vec::new();
+    for (code, text) in [(4_i32, "<AFNI>Zyxwvut</AFNI>"), (0, table)] {
+        let size = (8 + text.len()).next_multiple_of(16);
+        let mut extension = i32::try_from(size).unwrap().to_le_bytes().to_vec();
+        extension.extend(code.to_le_bytes());
+        extension.extend(text.as_bytes());
+        extension.resize(size, 0);
+        extensions.extend(extension);
+    }
+    file[348] = 1;
+    let offset = u16::try_from(352 + extensions.len()).unwrap();
+    file[108..112].copy_from_slice(&f32::from(offset).to_le_bytes());
+    file.splice(352..352, extensions);
+    file
+}
+
+#[test]
+fn names_in_the_header_of_nifti_are_those_of_the_labels() {
+    let grid = read_as("a.nii", &nifti(1, false)).unwrap().volume.grid;
+    let table = "<CaretExtension><VolumeInformation Index=\"0\"><LabelTable>\
+                 <Label Key=\"7\" Red=\"1\"><![CDATA[rib_left_7]]></Label>\n\
+                 <Label Key=\"9\" Red=\"1\"><![CDATA[spleen]]></Label></LabelTable></VolumeInformation></CaretExtension>";
+    let read = labels_as("labels.nii", &with_table(labelled_twice(), table), &grid).unwrap();
+    assert_eq!(read.labels.labels[..4], [8, 7, 7, 0]);
+    let names = [(7, "rib_left_7".to_owned()), (8, "label 8".to_owned())];
+    assert_eq!(read.labels.names, names);
+    let said: Vec<&str> = read.remarks.iter().map(|it| &*it.message).collect();
+    assert!(
+        said[0].contains("nothing was found of `spleen`"),
+        "{said:?}"
+    );
+    // A table that is damaged takes no label away.
+    let (cut, _) = table.split_once("_left_7").unwrap();
+    let read = labels_as("labels.nii", &with_table(labelled(), cut), &grid).unwrap();
+    assert_eq!(read.labels.names, [(7, "label 7".to_owned())]);
+    assert!(read.remarks[0].message.contains("is cut off"));
+    assert!(!format!("{:?}", read.remarks).contains("Zyxwvut"));
+}
