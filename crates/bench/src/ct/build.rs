@@ -171,8 +171,12 @@ pub(super) fn see(
     let volume = resampled.volume;
     let labels = options.labels.as_ref();
     let labels = labels.map(|given| {
-        let mut on =
-            |grid: &VoxelGrid| labels_of(given, grid, options.max_bytes, control, &mut remarks);
+        let reading = ReadOptions {
+            max_bytes: options.max_bytes,
+            scan: read.description.identity.clone(),
+            ..ReadOptions::default()
+        };
+        let mut on = |grid: &VoxelGrid| labels_of(given, grid, &reading, control, &mut remarks);
         if !is_interpolated {
             return on(&volume.grid);
         }
@@ -292,14 +296,10 @@ pub(super) fn register(
 fn labels_of(
     given: &GivenLabels,
     grid: &VoxelGrid,
-    max_bytes: u64,
+    options: &ReadOptions,
     control: &Control<'_>,
     remarks: &mut Vec<Remark>,
 ) -> Result<LabelMap, ImagingError> {
-    let options = ReadOptions {
-        max_bytes,
-        ..ReadOptions::default()
-    };
     let place = given.file.display().to_string();
     let within = |error: ImagingError| match &error {
         // A file of a folder, or an element of the file.
@@ -311,7 +311,7 @@ fn labels_of(
         }
         _ => error.at(place.clone()),
     };
-    let read = read_labels(&given.file, grid, &options, control.cancel).map_err(within)?;
+    let read = read_labels(&given.file, grid, options, control.cancel).map_err(within)?;
     remarks.extend(
         read.remarks
             .into_iter()

@@ -20,12 +20,12 @@ pub struct ReadLabels {
     pub remarks: Vec<Remark>,
 }
 
-/// Reads a label map of the CT on `grid` from a DICOM segmentation, any format of volumes, or a folder with a mask of one
-/// structure in each file.
+/// Reads a label map of the CT on `grid` from a DICOM segmentation or RT structure set, any format of volumes, or a folder
+/// with a mask of one structure in each file.
 ///
 /// Its voxels must be the CT's, to 0.01 mm at the corners; axes may run the other way or be in another order. It may
 /// have a part of the CT's voxels, as 3D Slicer crops segmentations: the others have no label. Where segments overlap,
-/// the last one counts; of masks in a folder, the one that is more specific.
+/// the last one counts; of masks in a folder and of contours, the one that is more specific.
 pub fn read_labels(
     path: &Path,
     grid: &VoxelGrid,
@@ -41,7 +41,7 @@ pub fn read_labels(
     }
     let read = match format_of(path)? {
         Format::Dicom => {
-            let (labels, remarks) = dicom::read_segmentation(path, grid, options, cancel)?;
+            let (labels, remarks) = dicom::read_labels(path, grid, options, cancel)?;
             ReadLabels { labels, remarks }
         }
         Format::Stored(open) => of_stored(open(path, options)?, grid, options, cancel)?,

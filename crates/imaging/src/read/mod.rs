@@ -6,6 +6,7 @@
 
 mod archive;
 mod bytes;
+mod contours;
 mod dicom;
 mod fields;
 mod foreign;
@@ -53,6 +54,17 @@ pub struct ReadOptions {
     pub assume_orientation: Option<Orientation>,
     /// Most bytes that the voxels may take in memory.
     pub max_bytes: u64,
+    /// Of a label map: the scan that it is of.
+    pub scan: ScanIdentity,
+}
+
+/// By what DICOM tells whether two files are of one scan.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ScanIdentity {
+    /// UID of the frame in which places are.
+    pub frame_of_reference: Option<String>,
+    /// UID of the series.
+    pub series_uid: Option<String>,
 }
 
 impl Default for ReadOptions {
@@ -62,6 +74,7 @@ impl Default for ReadOptions {
             fill_gaps: false,
             assume_orientation: None,
             max_bytes: 4 << 30,
+            scan: ScanIdentity::default(),
         }
     }
 }
@@ -140,6 +153,9 @@ pub struct Description {
     pub files: usize,
     /// Voxels that the scanner did not see: air in the volume, and not to be counted in statistics.
     pub padding_voxels: u64,
+    /// Which scan it is, for label maps of it; in no output.
+    #[serde(skip)]
+    pub identity: ScanIdentity,
 }
 
 /// Reads a CT: a DICOM file, a folder of DICOM files, NIfTI (`.nii`, `.nii.gz`, `.hdr` with `.img`), NRRD (`.nrrd`, `.nhdr`),

@@ -130,7 +130,8 @@ pub(super) fn not_found(names: &[String]) -> Option<Remark> {
     })
 }
 
-fn listed(names: &[String]) -> String {
+/// Names for a sentence, not too many of them.
+pub(super) fn listed(names: &[String]) -> String {
     let first = names.iter().take(LISTED).map(|name| format!("`{name}`"));
     let mut text = first.collect::<Vec<_>>().join(", ");
     if names.len() > LISTED {

@@ -17,6 +17,9 @@ const DEPTH: usize = 12;
 /// Bytes that a wanted value may have: image types and texts are short.
 const VALUE_BYTES: u64 = 1 << 14;
 
+/// Bytes that the points of a contour may have.
+const CONTOUR_BYTES: u64 = 1 << 26;
+
 /// Items of all sequences together: an image has at most a handful for each of its frames.
 const ITEMS: usize = 1 << 20;
 
@@ -400,7 +403,12 @@ impl<R: Read + Seek> Elements<R> {
             }
             return Ok(());
         }
-        if tag::is_value(tag) && length <= VALUE_BYTES {
+        let most = if tag == tag::CONTOUR_DATA {
+            CONTOUR_BYTES
+        } else {
+            VALUE_BYTES
+        };
+        if tag::is_value(tag) && length <= most {
             let mut bytes = vec![0; usize::try_from(length).unwrap_or(0)];
             self.fill(&mut bytes)?;
             found.values.insert(tag, Value { vr, bytes });

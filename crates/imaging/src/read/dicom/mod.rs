@@ -13,6 +13,7 @@ mod pixels;
 mod segmentation;
 mod series;
 mod stack;
+mod structure_set;
 mod syntax;
 mod tag;
 
@@ -25,11 +26,10 @@ use self::file::OpenedFile;
 use self::image::{Slice, named, slices};
 use self::stack::Stack;
 use super::placing::within_reason;
-use super::{Description, ReadOptions, ReadVolume, plausibility};
-use crate::{ImagingError, Remark, Volume};
+use super::{Description, ReadOptions, ReadVolume, ScanIdentity, plausibility};
+use crate::{ImagingError, LabelMap, Remark, Volume, VoxelGrid};
 
 pub(super) use file::{FIRST_BYTES, has_mark, is_dicom};
-pub(super) use segmentation::read as read_segmentation;
 
 /// Folders within folders, as exports have them: patient, study, series.
 const DEPTH: usize = 8;
@@ -42,6 +42,19 @@ const TILT_DEG: f64 = 0.5;
 
 /// Slices of a scan overlap by half, or by two thirds: with more they are slabs made of thinner ones.
 const OVERLAP: f64 = 3.01;
+
+/// Reads a segmentation or an RT structure set of the CT on `grid`.
+pub(super) fn read_labels(
+    path: &Path,
+    grid: &VoxelGrid,
+    options: &ReadOptions,
+    cancel: &AtomicBool,
+) -> Result<(LabelMap, Vec<Remark>), ImagingError> {
+    match structure_set::open(path, options, cancel)? {
+        Some(opened) => structure_set::read(&opened, grid, options, cancel),
+        None => segmentation::read(path, grid, options, cancel),
+    }
+}
 
 /// What was found at a path.
 struct Found {
@@ -402,5 +415,9 @@ fn description(stack: &Stack, label: String, padding_voxels: u64) -> Description
         patient_position: first.patient_position,
         files: files.len(),
         padding_voxels,
+        identity: ScanIdentity {
+            frame_of_reference: first.key.frame_of_reference.clone(),
+            series_uid: Some(first.key.uid.clone()).filter(|uid| !uid.is_empty()),
+        },
     }
 }

@@ -18,7 +18,7 @@ const SAME_PLACE_M: f64 = 1e-5;
 const HALF: f64 = 0.5;
 
 /// Reads a segmentation of the CT on `grid`; slices without a frame have no labels.
-pub(in crate::read) fn read(
+pub(super) fn read(
     path: &Path,
     grid: &VoxelGrid,
     options: &ReadOptions,
@@ -36,7 +36,9 @@ pub(in crate::read) fn read(
         return Err(
             ImagingError::refused("not a segmentation: there is no SegmentationType")
                 .at("(0062,0001)")
-                .hint("a label map is read from DICOM SEG or NIfTI"),
+                .hint(
+                    "a label map is read from DICOM SEG or RTSTRUCT, NIfTI, NRRD, MetaImage or MGH",
+                ),
         );
     };
     let mut remarks = Vec::new();

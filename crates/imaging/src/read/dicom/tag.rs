@@ -66,10 +66,25 @@ tags! {
     SEGMENT_LABEL = 0x0062_0005;
     REFERENCED_SEGMENT = 0x0062_000B;
     GREATEST_FRACTION = 0x0062_000E;
+    ROI_NUMBER = 0x3006_0022;
+    REFERENCED_FRAME = 0x3006_0024;
+    ROI_NAME = 0x3006_0026;
+    CONTOUR_TYPE = 0x3006_0042;
+    CONTOUR_POINTS = 0x3006_0046;
+    CONTOUR_DATA = 0x3006_0050;
+    REFERENCED_ROI = 0x3006_0084;
+    ROI_TYPE = 0x3006_00A4;
 }
 
 /// Integers that are written as texts, and those of four bytes; all others have two.
-pub(super) const INTEGER_STRINGS: [Tag; 3] = [SERIES_NUMBER, ACQUISITION_NUMBER, FRAMES];
+pub(super) const INTEGER_STRINGS: [Tag; 6] = [
+    SERIES_NUMBER,
+    ACQUISITION_NUMBER,
+    FRAMES,
+    ROI_NUMBER,
+    CONTOUR_POINTS,
+    REFERENCED_ROI,
+];
 pub(super) const LONGS: [Tag; 1] = [TEMPORAL_POSITION_INDEX];
 
 /// Sequences that are gone into.
@@ -80,6 +95,14 @@ pub(super) const SEGMENTS: Tag = 0x0062_0002;
 pub(super) const SEGMENT_TYPE: Tag = 0x0062_000F;
 pub(super) const SEGMENT_TYPE_MODIFIER: Tag = 0x0062_0011;
 pub(super) const MODALITY_LUT: Tag = 0x0028_3000;
+pub(super) const REFERENCED_FRAMES: Tag = 0x3006_0010;
+pub(super) const REFERENCED_STUDIES: Tag = 0x3006_0012;
+pub(super) const REFERENCED_SERIES: Tag = 0x3006_0014;
+pub(super) const STRUCTURES: Tag = 0x3006_0020;
+pub(super) const ROI_CONTOURS: Tag = 0x3006_0039;
+pub(super) const CONTOURS: Tag = 0x3006_0040;
+pub(super) const OBSERVATIONS: Tag = 0x3006_0080;
+pub(super) const ROI_CODE: Tag = 0x3006_0086;
 const PLANE_POSITION: Tag = 0x0020_9113;
 const PLANE_ORIENTATION: Tag = 0x0020_9116;
 const FRAME_CONTENT: Tag = 0x0020_9111;
@@ -93,10 +116,18 @@ const CARDIAC_SYNCHRONIZATION: Tag = 0x0018_9118;
 const RESPIRATORY_SYNCHRONIZATION: Tag = 0x0020_9253;
 const X_RAY_3D_FRAME_TYPE: Tag = 0x0018_9504;
 
-const SEQUENCES: [Tag; 19] = [
+const SEQUENCES: [Tag; 27] = [
     RESPIRATORY_SYNCHRONIZATION,
     X_RAY_3D_FRAME_TYPE,
     DIRECTORY_RECORDS,
+    CONTOURS,
+    OBSERVATIONS,
+    REFERENCED_FRAMES,
+    REFERENCED_SERIES,
+    REFERENCED_STUDIES,
+    ROI_CODE,
+    ROI_CONTOURS,
+    STRUCTURES,
     CARDIAC_SYNCHRONIZATION,
     CT_RECONSTRUCTION,
     CT_X_RAY,

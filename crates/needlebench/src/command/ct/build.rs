@@ -71,8 +71,8 @@ pub(crate) struct BuildArguments {
     /// Skin entry for a lesion, mm in the scan [default: the best entry that `suggest` finds].
     #[arg(long = "entry", value_name = "NAME=X,Y,Z", value_parser = named_place, allow_hyphen_values = true)]
     entries: Vec<NamedPlace>,
-    /// Segmentation by another program, e.g. 3D Slicer or TotalSegmentator: .seg.nrrd, DICOM segmentation, a label map in a format of
-    /// volumes, or a folder with a mask in each file, named by its structure.
+    /// Segmentation by another program, e.g. 3D Slicer or TotalSegmentator: .seg.nrrd, DICOM segmentation or RT structure set, a label map
+    /// in a format of volumes, or a folder with a mask in each file, named by its structure.
     #[arg(long, value_name = "PATH")]
     labels: Option<PathBuf>,
     /// Names of the labels: JSON, a 3D Slicer colour table, or lines like `1,lung_left`.

@@ -57,6 +57,7 @@ impl ReadArguments {
             fill_gaps: self.fill_gaps,
             assume_orientation: self.assume_orientation,
             max_bytes: self.max_bytes(),
+            ..ReadOptions::default()
         };
         read_volume(path, &options, self.threads(), cancel)
     }
