@@ -11,3 +11,4 @@ mod mutated;
 mod nifti;
 mod nrrd;
 mod sent;
+mod structure_set;

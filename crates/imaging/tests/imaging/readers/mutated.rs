@@ -72,6 +72,16 @@ proptest! {
     }
 
     #[test]
+    fn changed_structure_set_is_answered(changes in changes()) {
+        let grid = read_as("a.nii", &nifti(1, false)).unwrap().volume.grid;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("RS.dcm");
+        std::fs::write(&path, changed(super::structure_set::made(), &changes)).unwrap();
+        let never = std::sync::atomic::AtomicBool::new(false);
+        let _ = read_labels(&path, &grid, &ReadOptions::default(), &never);
+    }
+
+    #[test]
     fn changed_dicom_is_answered(changes in changes()) {
         let slice = Slice::at(1.0).with(0x5200_9230, *b"SQ", [
             0xFE, 0xFF, 0x00, 0xE0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFE, 0xFF, 0x0D, 0xE0, 0, 0, 0, 0,
