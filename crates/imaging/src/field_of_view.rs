@@ -73,7 +73,8 @@ pub struct FieldOfView {
 }
 
 impl FieldOfView {
-    /// Of a volume with a value for each voxel: all of them, or those within the convex outline outside which all slices have padding.
+    /// Of a volume with a value for each voxel, whose slices run along the patient ([`crate::in_order`]): all voxels, or
+    /// those within the convex outline outside which all slices have padding.
     pub fn of(volume: &Volume) -> Self {
         let grid = &volume.grid;
         let [nx, ny, _] = grid.size();

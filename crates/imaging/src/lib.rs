@@ -24,6 +24,7 @@ mod orientation;
 pub mod read;
 mod reconstruct;
 pub mod registration;
+mod reorder;
 mod resample;
 mod segment;
 mod serial;
@@ -48,6 +49,7 @@ pub use reconstruct::{
     LesionSize, MeasuredLesion, Progress, ReconstructOptions, Reconstruction, Surface,
     SurfaceSizes, reconstruct,
 };
+pub use reorder::in_order;
 pub use resample::{Resampled, resample, resample_labels};
 pub use segment::{
     Beside, BesideKind, Body, Bone, FIRST_LESION, Label, LabelFacts, Lesion, LesionSeed, Levels,

@@ -180,7 +180,7 @@ pub type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
 /// What comes out does not depend on the number of threads.
 ///
 /// # Errors
-/// If there is no body, a label map is of another grid, or it was told to stop.
+/// If slices do not run along the patient, there is no body, a label map is of another grid, or it was told to stop.
 pub fn reconstruct(
     volume: &Volume,
     options: &ReconstructOptions,

@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{Point3, Vector3};
 
 use crate::in_slices::in_slices;
+use crate::reorder::in_order;
 use crate::{AIR_HU, ImagingError, LabelMap, NotAGrid, Orientation, Remark, Volume, VoxelGrid};
 
 /// Deviation of a step from an axis, as a share of it, up to which axes are only turned round or in another order:
@@ -35,6 +36,7 @@ pub fn resample(
     threads: usize,
     cancel: &AtomicBool,
 ) -> Result<Resampled, ImagingError> {
+    let volume = in_order(volume, threads, cancel)?;
     if volume.grid.is_aligned() {
         return Ok(Resampled {
             volume,

@@ -13,7 +13,7 @@ use needlebench_imaging::registration::{
 };
 use needlebench_imaging::{
     FieldOfView, ImagingError, LabelMap, LesionSeed, ReconstructOptions, Reconstruction, Remark,
-    Surface, SurfaceSizes, SurfaceTissue, Volume, VoxelGrid, reconstruct, resample,
+    Surface, SurfaceSizes, SurfaceTissue, Volume, VoxelGrid, in_order, reconstruct, resample,
     resample_labels, structure_of,
 };
 use needlebench_scenario::scenario::PartTissue;
@@ -162,9 +162,11 @@ pub(super) fn see(
     } = *control;
     let _stage = tracing::info_span!("see").entered();
     let mut remarks = read.remarks;
-    let field_of_view = FieldOfView::of(&read.volume);
-    let of_file = read.volume.grid.clone();
-    let resampled = resample(read.volume, options.max_bytes, threads, cancel)?;
+    // From here on axes are the patient's, whichever way the file has them.
+    let volume = in_order(read.volume, threads, cancel)?;
+    let field_of_view = FieldOfView::of(&volume);
+    let of_file = volume.grid.clone();
+    let resampled = resample(volume, options.max_bytes, threads, cancel)?;
     let is_interpolated = resampled.remark.is_some();
     tracing::info!(is_interpolated, "volume on a straight grid");
     remarks.extend(resampled.remark);

@@ -5,5 +5,6 @@ mod further_engine;
 #[path = "../../../engine/tests/engine/common/replay.rs"]
 mod replay;
 mod routes;
+mod scan_orders;
 mod study_cases;
 mod suggest;

@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::error::{ImagingError, Remark};
 use crate::field_of_view::FieldOfView;
 use crate::mask::{IndexBox, Mask};
+use crate::orientation::Orientation;
 use crate::spacing::{orthogonal, whole};
 use crate::volume::Volume;
 
@@ -98,7 +99,7 @@ impl Levels {
 /// Finds body, lungs, airways, vessels and bone in what a scan has `seen`.
 ///
 /// # Errors
-/// If the grid is sheared, nothing is denser than air, or it was told to stop.
+/// If the grid is sheared or its slices do not run along the patient, nothing is denser than air, or it was told to stop.
 pub fn segment(
     volume: &Volume,
     seen: &FieldOfView,
@@ -127,8 +128,16 @@ pub fn segment(
     })
 }
 
-/// Whether there is a value for each voxel.
+/// Whether there is a value for each voxel, in slices along the patient.
 pub(crate) fn check_complete(volume: &Volume) -> Result<(), ImagingError> {
+    let orientation = Orientation::of(&volume.grid);
+    let [_, _, (along, _)] = orientation.axes();
+    if along != 2 {
+        return Err(ImagingError::refused(format!(
+            "its axes are {orientation}: slices do not run from feet to head"
+        ))
+        .hint("put the voxels in the order of the patient's axes first (`in_order`)"));
+    }
     if volume.hu.len() == volume.grid.len() {
         return Ok(());
     }

@@ -459,6 +459,15 @@ fn what_is_no_patient_is_refused() {
             .1
             .contains("perpendicular")
     );
+    let [i, j, k] = [0, 1, 2].map(|axis| grid().steps_m().column(axis).into_owned());
+    let sagittal = Matrix3::from_columns(&[j, k, i]);
+    let sagittal = Volume {
+        grid: VoxelGrid::new([SIZE[1], SIZE[2], SIZE[0]], sagittal, Point3::origin()).unwrap(),
+        ..empty.clone()
+    };
+    let refused = run(&sagittal, &options()).err().unwrap();
+    let (_, message) = refusal(&refused);
+    assert!(message.contains("PSL"), "{message}");
     let mut wrong = options();
     wrong.levels = Levels {
         skin_hu: 300.0,

@@ -120,7 +120,7 @@ impl VoxelAnatomy {
     /// grid's run along them.
     ///
     /// # Errors
-    /// Voxels that are not orthogonal, a target outside them or outside the body, interrupted.
+    /// A grid that is not along the axes of `ct`, a target outside them or outside the body, interrupted.
     pub fn new(
         labels: &LabelMap,
         origin_in_ct_m: Vector3<f64>,
@@ -128,6 +128,11 @@ impl VoxelAnatomy {
         options: &VoxelOptions<'_>,
     ) -> Result<Self, ImagingError> {
         let grid = &labels.grid;
+        if !grid.is_aligned() {
+            return Err(ImagingError::refused(
+                "the label map's axes do not run to the left, the back and the head",
+            ));
+        }
         let spacing_m = grid.spacing_m();
         let at = grid.index_from_ct(&(target + origin_in_ct_m));
         let centre = voxel_at(&at, grid.size()).ok_or_else(|| {
