@@ -150,8 +150,9 @@ const STRATA: [Stratum; 11] = [
     ("below 10 mm", |it| it.diameter_mm < 10.0),
 ];
 
-/// Prints the strata, and refuses a share of all that is not 95 +- 3 %, and a stratum of more than 20 below 88 %.
-fn judge(all: &[Outcome]) {
+/// Prints the strata of a population, and refuses a share of all that is not 95 +- 3 %, and a stratum of more than 20 below
+/// 88 %.
+fn judge(population: &str, all: &[Outcome]) {
     for each in all {
         let Some((error, squared)) = each.error else {
             println!("{} no goal: {}", each.seed, each.words);
@@ -181,23 +182,28 @@ fn judge(all: &[Outcome]) {
         );
     }
     let [(_, (_, of_all, _)), ..] = rows;
+    println!(
+        "{} {population} nodules: {:.1} % of the true centres in the stated ellipsoid of 95 %",
+        all.len(),
+        1e2 * of_all
+    );
     assert!((0.92..=0.98).contains(&of_all), "{of_all}");
     for (name, (count, share, _)) in rows {
         assert!(count < 20 || share >= 0.88, "{name}: {share}");
     }
 }
 
-/// Minutes: `cargo test -p needlebench-imaging --release --test imaging -- --ignored --nocapture nodules`.
+/// By the check `nodules` of the evidence: 2 s of a core for each nodule, in release mode.
 #[test]
-#[ignore = "two minutes in release mode"]
+#[ignore = "ten minutes of a core: .ci/run nodules"]
 fn three_hundred_true_centres_are_as_near_as_stated() {
-    judge(&outcomes(&usual(), 15_000..15_300));
+    judge("usual", &outcomes(&usual(), 15_000..15_300));
 }
 
 #[test]
-#[ignore = "a minute in release mode"]
+#[ignore = "three minutes of a core: .ci/run nodules"]
 fn centres_of_longer_nodules_are_as_near_as_stated() {
-    judge(&outcomes(&longer(), 9000..9100));
+    judge("longer", &outcomes(&longer(), 9000..9100));
 }
 
 /// A few of each, for every run of the tests.
