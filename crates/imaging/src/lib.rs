@@ -46,7 +46,7 @@ pub use mask::{IndexBox, Mask};
 pub use morphology::{closed, dilated, eroded, opened};
 pub use orientation::{NoOrientation, Orientation};
 pub use reconstruct::{
-    LesionSize, MeasuredLesion, Progress, ReconstructOptions, Reconstruction, Surface,
+    LesionSize, MeasuredLesion, NotGrown, Progress, ReconstructOptions, Reconstruction, Surface,
     SurfaceSizes, reconstruct,
 };
 pub use reorder::in_order;

@@ -141,6 +141,15 @@ pub struct MeasuredLesion {
     pub size: Option<LesionSize>,
 }
 
+/// A lesion that could not be grown.
+#[derive(Debug, Clone)]
+pub struct NotGrown {
+    /// What it is called.
+    pub name: String,
+    /// Why.
+    pub error: ImagingError,
+}
+
 /// What was made of a volume.
 #[derive(Debug, Clone)]
 pub struct Reconstruction {
@@ -154,8 +163,8 @@ pub struct Reconstruction {
     pub surfaces: Vec<Surface>,
     /// Lesions of the label map, then those that could be grown, in the order in which they were asked for.
     pub lesions: Vec<MeasuredLesion>,
-    /// Why the others could not, each with the name of the lesion; a remark says the same.
-    pub not_grown: Vec<ImagingError>,
+    /// The others; a remark says the same.
+    pub not_grown: Vec<NotGrown>,
     /// What a user has to know.
     pub remarks: Vec<Remark>,
 }
@@ -211,7 +220,8 @@ pub fn reconstruct(
             Err(ImagingError::Interrupted) => return Err(ImagingError::Interrupted),
             Err(error) => {
                 remarks.extend(error.remark());
-                not_grown.push(error);
+                let name = seed.name.clone();
+                not_grown.push(NotGrown { name, error });
             }
         }
     }

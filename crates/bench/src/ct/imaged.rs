@@ -346,8 +346,9 @@ fn goals(
         let truth = scan.truth.lesions.iter().find(|lesion| lesion.name == name);
         let is_built = build.targets.iter().any(|target| target.name == name);
         let Some(truth) = truth.filter(|_| is_built) else {
-            if let Some(error) = build.seen.made.not_grown.first() {
-                return Err(error.clone());
+            let mut not_grown = build.seen.made.not_grown.iter();
+            if let Some(own) = not_grown.find(|each| each.name == name) {
+                return Err(own.error.clone());
             }
             return Err(ImagingError::refused(format!(
                 "lesion `{name}` is not visible in the scan"

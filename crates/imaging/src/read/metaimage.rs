@@ -320,19 +320,21 @@ fn grid(
     remarks: &mut Vec<Remark>,
 ) -> Result<VoxelGrid, ImagingError> {
     let unit_m = unit_m(entries)?;
-    let spacing = match entries.any(&["ElementSpacing", "ElementSize"]) {
-        Some(entry) => {
-            let numbers = entry.numbers(axes)?;
-            Some([numbers[0], numbers[1], numbers[2]])
-        }
-        None => None,
+    let Some(spacing) = entries.any(&["ElementSpacing", "ElementSize"]) else {
+        return Err(ImagingError::refused(
+            "ElementSpacing is missing: the distances between voxels are unknown",
+        )
+        .at("ElementSpacing")
+        .hint("write it into the header, in mm: `ElementSpacing = 0.7 0.7 1`"));
     };
+    let numbers = spacing.numbers(axes)?;
+    let spacing = [numbers[0], numbers[1], numbers[2]];
     let directions = entries.any(&["TransformMatrix", "Rotation", "Orientation"]);
-    let (Some(spacing), Some(directions)) = (spacing, directions) else {
+    let Some(directions) = directions else {
         let voxels = Unplaced {
-            what: "neither TransformMatrix nor ElementSpacing may be missing: left and right of the patient are unknown",
-            place: "TransformMatrix, ElementSpacing",
-            spacing_m: spacing.map(|spacing| spacing.map(|each| each.abs() * unit_m)),
+            what: "TransformMatrix is missing: left and right of the patient are unknown",
+            place: "TransformMatrix",
+            spacing_m: Some(spacing.map(|each| each.abs() * unit_m)),
             size,
         };
         let grid = unplaced(&voxels, options, remarks)?;

@@ -43,9 +43,11 @@ pub(super) fn within_reason(
                 extent_m
             ))
             .hint(match unit_key {
-                None => "correct the affine in the header, which is in mm".to_owned(),
+                None => {
+                    "correct the distances between voxels in the header, which are in mm".to_owned()
+                }
                 Some(key) => format!(
-                    "correct the unit of length in the header ({key}): most affines are in mm"
+                    "correct the unit of length in the header ({key}): most files are in mm"
                 ),
             }));
         }
@@ -103,9 +105,9 @@ pub(super) fn unplaced(
 ) -> Result<VoxelGrid, ImagingError> {
     let Some(assumed) = &options.assume_orientation else {
         return Err(ImagingError::refused(voxels.what).at(voxels.place).hint(
-            "write the affine into the header; or, if you know the voxel axes, give them, e.g. \
-             --assume-orientation LPS: columns to the patient's left, rows to posterior, slices to \
-             superior",
+            "write the directions of the voxel axes into the header; or, if you know them, give \
+             them, e.g. --assume-orientation LPS: columns to the patient's left, rows to posterior, \
+             slices to superior",
         ));
     };
     let Some(spacing_m) = voxels.spacing_m else {

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_geometry::mesh::check_closed;
 use needlebench_imaging::{
-    FIRST_LESION, ImagingError, Label, LabelMap, LesionSeed, Levels, Lung, ReconstructOptions,
-    Reconstruction, Side, SurfaceTissue, Volume, VoxelGrid, reconstruct,
+    FIRST_LESION, ImagingError, Label, LabelMap, LesionSeed, Levels, Lung, NotGrown,
+    ReconstructOptions, Reconstruction, Side, SurfaceTissue, Volume, VoxelGrid, reconstruct,
 };
 
 pub(super) const MM: f64 = 1e-3;
@@ -378,9 +378,10 @@ fn seeds_that_are_in_no_lesion_are_refused_by_name() {
         options.lesions = vec![seed("wrong", at_mm), seed("nodule", NODULE_MM)];
         let made = run(&volume, &options).unwrap();
         assert_eq!(made.lesions[0].lesion.name, "nodule");
-        let [error] = &made.not_grown[..] else {
+        let [NotGrown { name, error }] = &made.not_grown[..] else {
             panic!("{:?}", made.not_grown);
         };
+        assert_eq!(name, "wrong");
         let (place, message) = refusal(error);
         assert!(remarks(&made).contains(message));
         assert!(

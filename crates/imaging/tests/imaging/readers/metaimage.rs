@@ -219,6 +219,11 @@ fn what_makes_no_sense_is_refused_with_its_line() {
             "--assume-orientation",
         ),
         (
+            "ElementSpacing = 0.5 0.75 2\n",
+            "",
+            "write it into the header, in mm",
+        ),
+        (
             "0 1 0 -1 0 0 0 0 1",
             "0 1 0 0 1 0 0 0 1",
             "linearly dependent",

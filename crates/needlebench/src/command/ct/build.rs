@@ -259,8 +259,8 @@ fn make(
 
 /// The lesions that could not be grown: all else is built and written.
 fn not_grown(scan: &Path, built: &ScanBuild) -> Vec<Finding> {
-    let errors = built.seen.made.not_grown.iter();
-    let stops = errors.map(|error| Stop::of_scan(scan, error.clone()));
+    let not_grown = built.seen.made.not_grown.iter();
+    let stops = not_grown.map(|each| Stop::of_scan(scan, each.error.clone()));
     let findings = stops.filter_map(|stop| match stop {
         Stop::Refused(findings) => Some(findings),
         Stop::Interrupted => None,
@@ -404,9 +404,10 @@ fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, St
 }
 
 /// Reserved names of surfaces.
-const TAKEN: [&str; 9] = [
+const TAKEN: [&str; 10] = [
     "skin",
     "bone",
+    "other_bone",
     "trachea",
     "lung_left",
     "lung_right",
