@@ -46,7 +46,7 @@ pub struct BuildReport<'b> {
     /// Centres of lesions with what is known of their error.
     pub targets: &'b [BuiltTarget],
     /// What is worth knowing.
-    pub remarks: &'b [Remark],
+    pub remarks: Vec<Remark>,
 }
 
 /// A surface.
@@ -179,7 +179,7 @@ impl<'b> BuildReport<'b> {
                 .as_ref()
                 .map(|registered| &registered.registration),
             targets: &build.targets,
-            remarks: &build.remarks,
+            remarks: build.remarks.clone(),
         }
     }
 }

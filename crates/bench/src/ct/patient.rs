@@ -74,13 +74,14 @@ pub struct Room<'r> {
 
 /// The scenario of a patient that was built: surfaces as parts, the robot where the registration puts it, measured
 /// covariances, and these goals. It is for a file in `folder`, with the surfaces in [`SURFACES`] and the report that
-/// `section` names beside it.
+/// `section` names beside it. What [`couch_left_out`] says of the couch is told by `is_couch_left_out`.
 pub(crate) fn patient_scenario(
     room: &Room<'_>,
     build: &ScanBuild,
     goals: Vec<GoalSection>,
     section: BuildSection,
     folder: &Path,
+    is_couch_left_out: bool,
 ) -> Scenario {
     let frame = PatientFrame::of(build);
     let mut scenario = room.scenario.clone();
@@ -88,7 +89,7 @@ pub(crate) fn patient_scenario(
     scenario.ct = None;
     scenario.goals = goals;
     let own = scenario.phantom.take().unwrap_or_default();
-    let mut phantom = phantom(own, room, build, &frame);
+    let mut phantom = phantom(own, room, build, &frame, is_couch_left_out);
     phantom.build = Some(section);
     if let Some(registered) = &build.registered {
         let reference_from_phantom =
@@ -145,6 +146,7 @@ fn phantom(
     room: &Room<'_>,
     build: &ScanBuild,
     frame: &PatientFrame,
+    is_couch_left_out: bool,
 ) -> PhantomSection {
     let has_limbs = own.head || own.arms != needlebench_scenario::scenario::Arms::None;
     let model = room
@@ -174,9 +176,8 @@ fn phantom(
         }
     }
     let position_mm = frame.in_mm(&Point3::origin());
-    let is_left_out = couch_left_out(room, build).is_some();
     let surfaces = build.seen.made.surfaces.iter();
-    let surfaces = surfaces.filter(|surface| !(is_left_out && is_under(surface)));
+    let surfaces = surfaces.filter(|surface| !(is_couch_left_out && is_under(surface)));
     let parts = surfaces.map(|surface| PartSection {
         name: surface.name.clone(),
         file: format!("{SURFACES}/{}.stl", surface.name),

@@ -30,8 +30,6 @@ pub struct WrittenPatient<'b> {
     pub report: BuildReport<'b>,
     /// What was made of a former build of the folder.
     pub set_aside: Option<SetAside>,
-    /// What of the scan the scenario does not have, and why.
-    pub left_out: Option<Remark>,
 }
 
 /// What was made of a former build, and is used no longer.
@@ -89,14 +87,17 @@ pub fn write_patient<'b>(
             room: room_sha256(room, &goals)?,
         };
         images(aside, build, files, control)?;
-        let report = BuildReport::of(build, files, digests);
+        let left_out = couch_left_out(room, build);
+        let is_couch_left_out = left_out.is_some();
+        let mut report = BuildReport::of(build, files, digests);
+        report.remarks.extend(left_out);
         let text = json(&report)?;
         let section = BuildSection {
             report: REPORT_FILE.to_owned(),
             sha256: sha256_hex(text.as_bytes()),
         };
         let sha256 = section.sha256.clone();
-        let patient = patient_scenario(room, build, goals, section, folder);
+        let patient = patient_scenario(room, build, goals, section, folder, is_couch_left_out);
         let patient = scenario_text(&patient).map_err(ImagingError::refused)?;
         let patient = format!("# {first}\n{patient}");
         write_bytes(&aside.join(SCENARIO_FILE), patient.as_bytes())?;
@@ -110,7 +111,6 @@ pub fn write_patient<'b>(
         scenario,
         report,
         set_aside,
-        left_out: couch_left_out(room, build),
     })
 }
 

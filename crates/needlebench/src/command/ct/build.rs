@@ -582,12 +582,7 @@ fn in_words(
     }
     text.push('\n');
     let set_aside = written.set_aside.as_ref().map(SetAside::remark);
-    for remark in built
-        .remarks
-        .iter()
-        .chain(&set_aside)
-        .chain(&written.left_out)
-    {
+    for remark in report.remarks.iter().chain(&set_aside) {
         match &remark.place {
             Some(place) => write!(text, "\nnote: {place}: {}", remark.message)?,
             None => write!(text, "\nnote: {}", remark.message)?,
