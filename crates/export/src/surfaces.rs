@@ -38,8 +38,8 @@ use MovesWith::{Base, Flange, Link, World};
 /// Surfaces that share group, frame and colour, as one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MergedSurface {
-    /// What it is of: `robot`, `tool`, `skin`, `organ`, `bone`, `vessel`, `lesion`, `marker`, `table`, `gantry`,
-    /// `mount`, `obstacle`, `corridor`, `collision`.
+    /// What it is of: `robot`, `tool`, `skin`, `beside` (arms, couch and objects of a scan), `organ`, `bone`, `vessel`, `lesion`,
+    /// `marker`, `table`, `gantry`, `mount`, `obstacle`, `corridor`, `collision`.
     pub group: &'static str,
     /// What it moves with.
     pub frame: MovesWith,
@@ -120,7 +120,7 @@ impl Surfaces {
     pub fn add_tissue(&mut self, part: &PhantomPart, place: &Pose) {
         let (group, opacity) = match part.tissue {
             Tissue::Skin => ("skin", 0.22),
-            Tissue::Beside => ("skin", 0.5),
+            Tissue::Beside => ("beside", 0.5),
             Tissue::Organ => ("organ", 0.4),
             Tissue::Bone => ("bone", 1.0),
             Tissue::Fissure => ("organ", 0.5),
@@ -291,6 +291,22 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+
+    /// Hiding the skin does not hide the couch.
+    #[test]
+    fn what_is_beside_the_patient_has_a_group_of_its_own() {
+        let phantom = needlebench_phantom::Phantom::build(
+            &needlebench_phantom::Phantom::size_preset("male-p50-supine").unwrap(),
+        );
+        let mut skin = phantom.unwrap().parts[0].clone();
+        assert_eq!(skin.tissue, Tissue::Skin);
+        let mut surfaces = Surfaces::default();
+        surfaces.add_tissue(&skin, &Pose::identity());
+        skin.tissue = Tissue::Beside;
+        surfaces.add_tissue(&skin, &Pose::identity());
+        let groups: Vec<&str> = surfaces.0.iter().map(|each| each.group).collect();
+        assert_eq!(groups, ["skin", "beside"]);
+    }
 
     #[test]
     fn walls_between_touching_solids_are_left_out() {

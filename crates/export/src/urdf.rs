@@ -90,7 +90,9 @@ const RESERVED: [&str; 9] = [
 ];
 
 /// Groups of surfaces that a patient has.
-const TISSUES: [&str; 6] = ["skin", "organ", "bone", "vessel", "lesion", "marker"];
+const TISSUES: [&str; 7] = [
+    "skin", "beside", "organ", "bone", "vessel", "lesion", "marker",
+];
 
 /// The link of a collision body.
 fn link_of(body: &CollisionBody) -> String {
