@@ -4,8 +4,8 @@
 use std::path::Path;
 
 /// The formats that are read, for a hint.
-pub(super) const READ: &str = "a CT is read from DICOM (a file, or a folder, also in a ZIP archive), NIfTI (.nii, .nii.gz, .hdr with .img), \
-     NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), and MGH (.mgh, .mgz)";
+pub(super) const READ: &str = "a CT is read from DICOM (a file, or a folder, also in a ZIP archive), NIfTI \
+     (.nii, .nii.gz, .hdr with .img), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), and MGH (.mgh, .mgz)";
 
 const UNPACK: &str = "unpack it, and name the DICOM folder or the volume in it";
 const PICTURE: &str = "pictures have neither Hounsfield units nor places: export the scan as DICOM, or a volume as NIfTI, \

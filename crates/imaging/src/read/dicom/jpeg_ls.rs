@@ -503,7 +503,7 @@ impl<'a> Scan<'a> {
         let size = mapped + kind;
         let is_odd = size % 2;
         let is_negative = (k != 0 || 2 * known.b >= known.n) == (is_odd == 1);
-        let size = (size + is_odd) / 2;
+        let size = (size >> 1) + is_odd;
         let error = if is_negative { -size } else { size };
         if error < 0 {
             known.b += 1;
@@ -528,7 +528,8 @@ mod tests {
     use super::*;
 
     /// The example of the standard, H.3: 4 x 4 values of 8 bits.
-    const EXAMPLE: &[u8] = b"\xFF\xD8\xFF\xF7\x00\x0B\x08\x00\x04\x00\x04\x01\x01\x11\x00\xFF\xDA\x00\x08\x01\x01\x00\
+    const EXAMPLE: &[u8] = b"\xFF\xD8\xFF\xF7\x00\x0B\x08\x00\x04\x00\x04\x01\x01\x11\x00\xFF\xDA\
+        \x00\x08\x01\x01\x00\
         \x00\x00\x00\xC0\x00\x00\x6C\x80\x20\x8E\x01\xC0\x00\x00\x57\x40\x00\x00\x6E\xE6\x00\x00\x01\xBC\x18\x00\x00\
         \x05\xD8\x00\x00\x91\x60\xFF\xD9";
     const VALUES: [u16; 16] = [
@@ -536,13 +537,15 @@ mod tests {
     ];
 
     /// By CharLS: 16 x 12 values of 16 bits, lossless and with errors of 2 at most, with runs and edges.
-    const LOSSLESS: &str = "ffd8fff7000b10000c001001011100fff8000d01ffff0012004301140040ffda00080101000000004058010040100804\
+    const LOSSLESS: &str = "\
+        ffd8fff7000b10000c001001011100fff8000d01ffff0012004301140040ffda00080101000000004058010040100804\
         0201010df801a00000000000e2e3c498920000000000038a6d07070840018383c02534929253aac49000000000001c63\
         69280000000000038b49002014038058a51c2e24e069c137b8640280200c028064440cd855c32858712a24ee30000000\
         00001c96b000000000001c68780d00a009e17b76e59e1006e19e623cbe80040018383b37b24cedda2339174d62c65bcb\
         6004070030b07fcc55fd7cf21d07000000000001c51280101c00806b28ae312af3250b35b8e1724010240500c77902a7\
         340000000000038c7b93a02c6100061c3dc030380e010040600d4070280c0e008080ffd9";
-    const NEARLY: &str = "ffd8fff7000b10000c001001011100fff8000d01ffff0018004d01220040ffda00080101000200004060101010204082\
+    const NEARLY: &str = "\
+        ffd8fff7000b10000c001001011100fff8000d01ffff0018004d01220040ffda00080101000200004060101010204082\
         08bf00d0000000000019e3e1f0d00000000017360062900381ee51e8f6ae1e00000000034d1e00000000018780ea799b\
         86da2ba599c800300304143cdb1d4a9e2361d0dc980000000005280000000000019ed6030854de565602d1917d8d9340\
         04801b59757ed8ef8fc35c1430a2e91b68b75a3861b6a000000000000ced900200610c5e64c7717b54b2712900818431\
@@ -552,7 +555,7 @@ mod tests {
         let digits: Vec<u8> = hex
             .chars()
             .filter_map(|digit| digit.to_digit(16))
-            .map(|digit| digit as u8)
+            .filter_map(|digit| u8::try_from(digit).ok())
             .collect();
         digits
             .chunks(2)

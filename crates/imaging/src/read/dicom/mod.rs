@@ -206,7 +206,7 @@ fn find(path: &Path, options: &ReadOptions, cancel: &AtomicBool) -> Result<Found
     if path.is_dir() {
         collect(path, DEPTH, &mut files)?;
         files.sort();
-    } else if let Some(directory) = directory_at(path, options)? {
+    } else if let Some(directory) = directory_at(path, options) {
         directory.check()?;
         found.remarks.extend(directory.remark(&name_in(path, path)));
         files = directory.files;
@@ -242,13 +242,10 @@ fn find(path: &Path, options: &ReadOptions, cancel: &AtomicBool) -> Result<Found
 }
 
 /// The index of a disc that a file is; none of any other.
-fn directory_at(path: &Path, options: &ReadOptions) -> Result<Option<Directory>, ImagingError> {
-    let opened = OpenedFile::open(path, options.max_bytes);
+fn directory_at(path: &Path, options: &ReadOptions) -> Option<Directory> {
     // What is wrong with another file says itself when it is read.
-    let Ok(Some(opened)) = opened else {
-        return Ok(None);
-    };
-    Ok(Directory::of(&opened, path))
+    let opened = OpenedFile::open(path, options.max_bytes).ok()??;
+    Directory::of(&opened, path)
 }
 
 /// A file for people: by the folders that lead to it.

@@ -47,7 +47,7 @@ fn sent() -> Entries<'static> {
     entries.extend(
         names
             .into_iter()
-            .zip(stack(3).iter().map(|slice| slice.bytes())),
+            .zip(stack(3).iter().map(super::made::Slice::bytes)),
     );
     entries
 }

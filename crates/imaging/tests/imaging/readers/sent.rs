@@ -11,22 +11,20 @@ const DESCRIPTION: u32 = 0x0008_103E;
 const THICKNESS: u32 = 0x0018_0050;
 const PIXEL_SPACING: u32 = 0x0028_0030;
 
+/// Element, its VR, its values, and what they are called.
+type Phase = (u32, [u8; 2], [Vec<u8>; 2], [&'static str; 2]);
+
 fn default() -> ReadOptions {
     ReadOptions::default()
 }
 
 /// Slices with another element, and instances of their own.
-fn changed(
-    slices: Vec<Slice>,
-    tag: u32,
-    vr: [u8; 2],
-    value: impl Into<Vec<u8>> + Clone,
-) -> Vec<Slice> {
+fn changed(slices: Vec<Slice>, tag: u32, vr: [u8; 2], value: &str) -> Vec<Slice> {
     slices
         .into_iter()
         .map(|slice| {
-            let instance = format!("{}.{}", slice.instance, value.clone().into().len());
-            Slice { instance, ..slice }.with(tag, vr, value.clone())
+            let instance = format!("{}.{}", slice.instance, value.len());
+            Slice { instance, ..slice }.with(tag, vr, value)
         })
         .collect()
 }
@@ -43,7 +41,6 @@ fn of_series(series: u32, slices: Vec<Slice>) -> Vec<Slice> {
 #[test]
 fn phases_are_called_phases_with_what_tells_them_apart() {
     let breathing = |percent: f64| percent.to_le_bytes().to_vec();
-    type Phase = (u32, [u8; 2], [Vec<u8>; 2], [&'static str; 2]);
     let kinds: [Phase; 5] = [
         (
             DESCRIPTION,
