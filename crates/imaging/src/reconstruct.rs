@@ -652,6 +652,7 @@ fn sort(
 ) -> (Vec<Surface>, Vec<Option<LesionSize>>) {
     let mut surfaces = Vec::new();
     let mut sizes = vec![None; lesions];
+    let (mut coarse, mut stepped) = (Vec::new(), Vec::new());
     for (made, job) in made.into_iter().zip(jobs) {
         let Some(Made { surface, size }) = made else {
             remarks.push(
@@ -661,27 +662,33 @@ fn sort(
             continue;
         };
         if surface.error.p99_m > SURFACE_ERROR_M {
-            remarks.push(
-                Remark::new(format!(
-                    "P99 distance from the voxel surface is above the goal of {:.2} mm: {:.2} mm \
-                     with {} triangles",
-                    1e3 * SURFACE_ERROR_M,
-                    1e3 * surface.error.p99_m,
-                    surface.mesh.triangles.len()
-                ))
-                .at(job.name.clone()),
-            );
+            coarse.push(format!(
+                "{} {:.2} mm with {} triangles",
+                job.name,
+                1e3 * surface.error.p99_m,
+                surface.mesh.triangles.len()
+            ));
         }
         if surface.level_hu.is_none() {
-            remarks.push(
-                Remark::new("its surface is from a voxel mask, accurate to half a voxel")
-                    .at(job.name.clone()),
-            );
+            stepped.push(job.name.as_str());
         }
         if let (Some((number, _)), Some(size)) = (job.lesion, size) {
             sizes[number] = Some(size);
         }
         surfaces.push(surface);
+    }
+    if !coarse.is_empty() {
+        remarks.push(Remark::new(format!(
+            "P99 distance from the voxel surface above the goal of {:.2} mm: {}",
+            1e3 * SURFACE_ERROR_M,
+            coarse.join(", ")
+        )));
+    }
+    if !stepped.is_empty() {
+        remarks.push(Remark::new(format!(
+            "surfaces from a voxel mask, accurate to half a voxel: {}",
+            stepped.join(", ")
+        )));
     }
     (surfaces, sizes)
 }
