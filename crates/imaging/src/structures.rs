@@ -1,11 +1,11 @@
 //! What names of structures in label maps mean, and what surfaces are of.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::segment::BesideKind;
 
 /// What a surface is of, in the words of `[[phantom.parts]]`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SurfaceTissue {
     /// Outside of the body.

@@ -12,9 +12,9 @@ use needlebench_imaging::registration::{
     match_markers, register_weighted,
 };
 use needlebench_imaging::{
-    FieldOfView, ImagingError, LabelMap, LesionSeed, ReconstructOptions, Reconstruction, Remark,
-    Surface, SurfaceSizes, SurfaceTissue, Volume, VoxelGrid, in_order, reconstruct, resample,
-    resample_labels, structure_of,
+    FieldOfView, ImagingError, LabelFacts, LabelMap, LesionSeed, ReconstructOptions,
+    Reconstruction, Remark, Surface, SurfaceSizes, SurfaceTissue, Volume, VoxelGrid, in_order,
+    reconstruct, resample, resample_labels, structure_of,
 };
 use needlebench_scenario::scenario::PartTissue;
 use serde::Serialize;
@@ -103,6 +103,8 @@ pub struct SeenScan {
     pub markers: Option<Found>,
     /// What is worth knowing: of reading, of markers, of tissues.
     pub remarks: Vec<Remark>,
+    /// Structures of which a label map from elsewhere has voxels.
+    pub(super) mapped: Vec<String>,
     voxels_sha256: OnceLock<String>,
     labels_sha256: OnceLock<String>,
 }
@@ -206,6 +208,9 @@ pub(super) fn see(
             .iter()
             .flat_map(|found| found.remarks.iter().cloned()),
     );
+    let given_names = labels
+        .as_ref()
+        .map_or_else(Vec::new, |map| map.names.clone());
     let wanted = ReconstructOptions {
         lesions: options.lesions.clone(),
         labels,
@@ -227,8 +232,10 @@ pub(super) fn see(
     let small = without_scraps(&mut made.surfaces);
     remarks.extend(made.remarks.iter().cloned());
     remarks.extend(small);
+    let mapped = mapped_structures(&given_names, &made);
     Ok(SeenScan {
         volume,
+        mapped,
         source: read.description,
         made,
         field_of_view,
@@ -237,6 +244,19 @@ pub(super) fn see(
         voxels_sha256: OnceLock::new(),
         labels_sha256: OnceLock::new(),
     })
+}
+
+/// Structures of a label map with these names that have voxels.
+fn mapped_structures(given: &[(u16, String)], made: &Reconstruction) -> Vec<String> {
+    let is_given = |fact: &&LabelFacts| {
+        let mut given = given.iter();
+        given.any(|(label, name)| *label == fact.label && *name == fact.name)
+    };
+    let with_voxels = made.facts.iter().filter(|fact| fact.voxels > 0);
+    let structures = with_voxels
+        .filter(is_given)
+        .filter_map(|fact| structure_of(&fact.name));
+    structures.map(|structure| structure.name).collect()
 }
 
 /// Leaves out surfaces that are smaller than their tissue is anywhere: a scenario would take them for parts in a wrong

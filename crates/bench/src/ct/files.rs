@@ -6,6 +6,7 @@ use needlebench_imaging::registration::{MarkerMatch, Registration};
 use needlebench_imaging::{LabelFacts, LabelMap, LesionSize, Remark, SurfaceError, SurfaceTissue};
 use serde::Serialize;
 
+use super::overview::OverviewRow;
 use super::patient::{PatientFrame, SURFACES};
 use super::{BuiltTarget, ScanBuild};
 
@@ -33,6 +34,8 @@ pub struct BuildReport<'b> {
     pub labels_sha256: Option<String>,
     /// SHA-256 of the room and the goals: of what the scenario has that is not of the scan.
     pub room_sha256: String,
+    /// What was found, how much of it, from what, how accurate, and what is not known.
+    pub overview: Vec<OverviewRow>,
     /// Closed surfaces.
     pub surfaces: Vec<SurfaceReport<'b>>,
     /// Lesions of the label map, then those that were asked for, in that order.
@@ -134,6 +137,7 @@ impl<'b> BuildReport<'b> {
             voxels_sha256: files.volume.then(|| build.seen.voxels_sha256().to_owned()),
             labels_sha256: files.labels.then(|| build.seen.labels_sha256().to_owned()),
             room_sha256: digests.room,
+            overview: build.overview(),
             surfaces: made
                 .surfaces
                 .iter()
@@ -239,7 +243,7 @@ pub(super) const NAMES_FILE: &str = "labels.json";
 /// What was built.
 pub(super) const REPORT_FILE: &str = "report.json";
 /// Folder of images of slices there.
-pub(super) const SLICES: &str = "slices";
+pub const SLICES: &str = "slices";
 /// Routes that were planned there.
 pub const ROUTES_FILE: &str = "routes.json";
 /// Decisions of the planning page's user there.

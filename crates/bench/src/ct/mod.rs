@@ -6,6 +6,7 @@ mod built_folder;
 mod digest;
 mod files;
 mod imaged;
+mod overview;
 mod patient;
 mod scan_order;
 mod touched;
@@ -23,8 +24,11 @@ pub use build::{
 pub use built_folder::{
     BuildFacts, BuiltFolder, LesionFacts, MarkerFacts, SurfaceFacts, TargetFacts,
 };
-pub use files::{BuildFiles, BuildReport, ROUTES_FILE, SCENARIO_FILE, SESSION_FILE, VOLUME_FILE};
+pub use files::{
+    BuildFiles, BuildReport, ROUTES_FILE, SCENARIO_FILE, SESSION_FILE, SLICES, VOLUME_FILE,
+};
 pub use imaged::{Imaged, LastScan, imaged, scanned};
+pub use overview::{OverviewAccuracy, OverviewRow, OverviewSource};
 pub use patient::{PatientFrame, Room};
 pub use scan_order::{CtSubject, ScanOrder, ScanRange, SyntheticScan};
 pub use touched::marker_list;

@@ -85,6 +85,8 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
         .sum();
     assert!(off.sqrt() < 4.0 * rms_m, "{off} {rms_m}");
 
+    everything_is_in_the_overview(&report);
+
     // The scenario is taken as it is.
     let checked = bench.run("check patient/scenario.toml --json").json();
     let findings = checked.to_string();
@@ -103,6 +105,43 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
     a_room_that_is_not_the_markers_is_refused(&bench, &arguments);
     bench.run(&arguments).exits_with(0);
     nothing_outlives_its_build(&bench, &arguments);
+}
+
+/// What was found with its volume and how accurate it is, what was not, and what stands for it.
+fn everything_is_in_the_overview(report: &serde_json::Value) {
+    let overview = report["overview"].list();
+    let row = |name: &str| {
+        let mut rows = overview.iter().filter(|row| row["name"] == name);
+        rows.next().unwrap_or_else(|| panic!("no {name}"))
+    };
+    for surface in report["surfaces"].list() {
+        let found = row(surface["name"].word());
+        let of_lesion = surface["tissue"] == "lesion";
+        if !of_lesion {
+            assert_eq!(found["volume_m3"], surface["volume_m3"]);
+            let p99_m = &surface["distance_from_voxels"]["p99_m"];
+            assert_eq!(found["accuracy"]["surface_p99_m"], *p99_m);
+        }
+        let source = if of_lesion {
+            "seed_and_hu"
+        } else {
+            "hu_and_shape"
+        };
+        assert_eq!(found["source"], source, "{found}");
+    }
+    assert_eq!(row("mediastinum")["source"], "assumed");
+    assert_eq!(row("intercostal_vessels")["source"], "modelled");
+    assert_eq!(row("abdominal")["source"], "not_found");
+    let tre_m = &report["targets"][0]["registration"]["rms_m"];
+    assert_eq!(row("markers")["accuracy"]["tre_rms_m"], *tre_m);
+    // The sides at which notes say that the body is cut.
+    let ends = row("field_of_view")["unknown"].word();
+    let notes = report["remarks"].to_string();
+    for side in ["left", "right", "anterior", "posterior"] {
+        let is_cut = notes.contains(&format!("cuts the body on its {side} side"));
+        assert_eq!(ends.contains(side), is_cut, "{ends}: {notes}");
+    }
+    assert!(ends.starts_with("skin at both ends"), "{ends}");
 }
 
 #[test]
