@@ -25,6 +25,7 @@ FIGURES = {
     "iso9283.svg": "iso9283/attained.rapier.svg",
     "replay.svg": "ur3e_rad_20211005/replay.svg",
     "servo.svg": "table3/servo/wrist_1.svg",
+    "ct_overview.png": "patient/slices/overview.png",
     "ct_slice.png": "patient/slices/lesion_nodule_axial.png",
     "ct_routes.png": "patient/nodule.routes.png",
 }

@@ -100,8 +100,13 @@ fn a_scan_becomes_a_patient_that_can_be_run() {
             "does not predict the TRE",
             "TRE",
             "needlebench check",
+            "HU and shape",
+            "heart, great vessels",
+            "patient/slices/overview.png",
         ],
     );
+    let picture = fs::read(bench.path("patient/slices/overview.png")).unwrap();
+    assert!(picture.starts_with(b"\x89PNG"));
     a_room_that_is_not_the_markers_is_refused(&bench, &arguments);
     bench.run(&arguments).exits_with(0);
     nothing_outlives_its_build(&bench, &arguments);

@@ -30,11 +30,11 @@ const LUNG_WINDOW_HU: [f64; 2] = [-1350.0, 150.0];
 /// For soft tissue and bone.
 const SOFT_WINDOW_HU: [f64; 2] = [-160.0, 240.0];
 
-const PAPER: [u8; 3] = [246, 246, 244];
-const MARKER_COLOR: [u8; 3] = [255, 122, 200];
+pub(super) const PAPER: [u8; 3] = [246, 246, 244];
+pub(super) const MARKER_COLOR: [u8; 3] = [255, 122, 200];
 const CENTRE_COLOR: [u8; 3] = [255, 255, 255];
 
-fn color(tissue: SurfaceTissue) -> [u8; 3] {
+pub(super) fn color(tissue: SurfaceTissue) -> [u8; 3] {
     match tissue {
         SurfaceTissue::Skin => [245, 166, 60],
         SurfaceTissue::Bone => [250, 235, 130],
@@ -48,31 +48,31 @@ fn color(tissue: SurfaceTissue) -> [u8; 3] {
 
 /// A way to look at the scan: which axes of `ct` run to the right and down, and which one is cut.
 #[derive(Debug, Clone, Copy)]
-struct View {
-    name: &'static str,
+pub(super) struct View {
+    pub(super) name: &'static str,
     axes: [usize; 2],
     /// Whether the second axis runs up.
     up: bool,
-    cut: usize,
+    pub(super) cut: usize,
     /// Left, right, top, bottom.
-    letters: [char; 4],
+    pub(super) letters: [char; 4],
 }
 
-const AXIAL: View = View {
+pub(super) const AXIAL: View = View {
     name: "axial",
     axes: [0, 1],
     up: false,
     cut: 2,
     letters: ['R', 'L', 'A', 'P'],
 };
-const CORONAL: View = View {
+pub(super) const CORONAL: View = View {
     name: "coronal",
     axes: [0, 2],
     up: true,
     cut: 1,
     letters: ['R', 'L', 'S', 'I'],
 };
-const SAGITTAL: View = View {
+pub(super) const SAGITTAL: View = View {
     name: "sagittal",
     axes: [1, 2],
     up: true,
@@ -95,7 +95,7 @@ struct Slice {
 ///
 /// # Errors
 /// A picture that cannot be encoded.
-pub fn slice_pictures(build: &ScanBuild) -> Result<Vec<SlicePicture>, PictureError> {
+pub(super) fn slice_pictures(build: &ScanBuild) -> Result<Vec<SlicePicture>, PictureError> {
     let mut wanted = Vec::new();
     if let Some(skin) = build.seen.made.skin() {
         let [low, high] = needlebench_geometry::mesh::extent_m(&skin.mesh);
@@ -145,35 +145,46 @@ pub fn slice_pictures(build: &ScanBuild) -> Result<Vec<SlicePicture>, PictureErr
 }
 
 /// From places of the scan to pixels of the picture.
-struct Frame {
+pub(super) struct Frame {
     view: View,
     px_per_m: f64,
     /// Place at the left and top edge of what is shown of the scan, along the view's axes, m.
     first_m: [f64; 2],
+    /// Left and top edge of it in the picture.
+    pub(super) at_px: [usize; 2],
     /// Of what is shown of the scan.
-    size_px: [usize; 2],
+    pub(super) size_px: [usize; 2],
 }
 
 impl Frame {
     fn new(volume: &Volume, view: View) -> Self {
         let (low, high) = extent_m(volume);
         let [across, along] = view.axes;
+        let longest_m = f64::max(high[across] - low[across], high[along] - low[along]);
+        let mut frame = Self::of_box([low, high], view, LONG_PX / longest_m);
+        frame.at_px = [EDGE_PX, TITLE_PX + EDGE_PX];
+        frame
+    }
+
+    /// Of a box in `ct`.
+    pub(super) fn of_box([low, high]: [Point3<f64>; 2], view: View, px_per_m: f64) -> Self {
+        let [across, along] = view.axes;
         let lengths_m = [high[across] - low[across], high[along] - low[along]];
-        let px_per_m = LONG_PX / lengths_m[0].max(lengths_m[1]);
         Self {
             view,
             px_per_m,
             first_m: [low[across], if view.up { high[along] } else { low[along] }],
+            at_px: [0; 2],
             size_px: lengths_m.map(|length_m| whole(length_m * px_per_m).max(1)),
         }
     }
 
-    fn px(&self, place: &Point3<f64>) -> [f64; 2] {
+    pub(super) fn px(&self, place: &Point3<f64>) -> [f64; 2] {
         let [across, along] = self.view.axes;
         let down = if self.view.up { -1.0 } else { 1.0 };
         [
-            EDGE_PX as f64 + (place[across] - self.first_m[0]) * self.px_per_m,
-            (TITLE_PX + EDGE_PX) as f64 + down * (place[along] - self.first_m[1]) * self.px_per_m,
+            self.at_px[0] as f64 + (place[across] - self.first_m[0]) * self.px_per_m,
+            self.at_px[1] as f64 + down * (place[along] - self.first_m[1]) * self.px_per_m,
         ]
     }
 
@@ -190,7 +201,7 @@ impl Frame {
 }
 
 /// Lowest and highest place of a volume, its outermost voxels included.
-fn extent_m(volume: &Volume) -> (Point3<f64>, Point3<f64>) {
+pub(super) fn extent_m(volume: &Volume) -> (Point3<f64>, Point3<f64>) {
     let half = Vector3::from(volume.grid.spacing_m()) * 0.5;
     let first = volume.grid.first_m();
     let last = Vector3::from(volume.grid.size().map(|count| count as f64 - 1.0));
@@ -203,7 +214,7 @@ fn extent_m(volume: &Volume) -> (Point3<f64>, Point3<f64>) {
     clippy::cast_sign_loss,
     reason = "not negative, and of a picture"
 )]
-fn whole(value: f64) -> usize {
+pub(super) fn whole(value: f64) -> usize {
     value.round().max(0.0) as usize
 }
 
@@ -216,7 +227,7 @@ fn drawn(build: &ScanBuild, slice: &Slice) -> Result<SlicePicture, PictureError>
         height + 2 * EDGE_PX + TITLE_PX + legend_px,
         PAPER,
     );
-    shade(&mut image, build, slice, &frame);
+    shade(&mut image, build, slice.at_m, slice.window_hu, &frame);
     let mut shown: Vec<(&str, [u8; 3])> = Vec::new();
     for surface in &build.seen.made.surfaces {
         let color = color(surface.tissue);
@@ -239,19 +250,25 @@ fn drawn(build: &ScanBuild, slice: &Slice) -> Result<SlicePicture, PictureError>
 }
 
 /// Densities as greys.
-fn shade(image: &mut Image, build: &ScanBuild, slice: &Slice, frame: &Frame) {
-    let [low_hu, high_hu] = slice.window_hu;
+pub(super) fn shade(
+    image: &mut Image,
+    build: &ScanBuild,
+    at_m: f64,
+    [low_hu, high_hu]: [f64; 2],
+    frame: &Frame,
+) {
+    let [left, top] = frame.at_px;
     let [width, height] = frame.size_px;
     for y in 0..height {
         for x in 0..width {
             let hu = interpolated(
                 &build.seen.volume,
-                &frame.place(slice.at_m, [x, y]),
-                slice.view.cut,
+                &frame.place(at_m, [x, y]),
+                frame.view.cut,
             );
             let share = ((hu - low_hu) / (high_hu - low_hu)).clamp(0.0, 1.0);
             let grey = u8::try_from(whole(255.0 * share)).unwrap_or(u8::MAX);
-            image.fill([EDGE_PX + x, TITLE_PX + EDGE_PX + y], [1, 1], [grey; 3]);
+            image.fill([left + x, top + y], [1, 1], [grey; 3]);
         }
     }
 }
@@ -288,7 +305,7 @@ fn interpolated(volume: &Volume, place: &Point3<f64>, cut: usize) -> f64 {
 }
 
 /// Where a plane across an axis cuts a surface.
-fn cut(mesh: &TriangleMesh, axis: usize, at_m: f64) -> Vec<[Point3<f64>; 2]> {
+pub(super) fn cut(mesh: &TriangleMesh, axis: usize, at_m: f64) -> Vec<[Point3<f64>; 2]> {
     let mut segments = Vec::new();
     for triangle in &mesh.triangles {
         let corners = triangle.map(|at| mesh.vertices_m[at as usize]);
@@ -311,7 +328,7 @@ fn cut(mesh: &TriangleMesh, axis: usize, at_m: f64) -> Vec<[Point3<f64>; 2]> {
 }
 
 /// A line of one and a half pixels.
-fn line(image: &mut Image, a: [f64; 2], b: [f64; 2], color: [u8; 3]) {
+pub(super) fn line(image: &mut Image, a: [f64; 2], b: [f64; 2], color: [u8; 3]) {
     const HALF_PX: f64 = 0.75;
     let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
     let squared = dx * dx + dy * dy;
@@ -341,7 +358,7 @@ fn line(image: &mut Image, a: [f64; 2], b: [f64; 2], color: [u8; 3]) {
     }
 }
 
-fn cross(image: &mut Image, [x, y]: [f64; 2], reach: f64, color: [u8; 3]) {
+pub(super) fn cross(image: &mut Image, [x, y]: [f64; 2], reach: f64, color: [u8; 3]) {
     line(image, [x - reach, y], [x + reach, y], color);
     line(image, [x, y - reach], [x, y + reach], color);
 }

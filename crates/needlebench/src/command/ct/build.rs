@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_bench::ct::{
     BuildFiles, BuildOptions, BuildReport, GivenLabels, KnownMarkers, PatientFrame, Registered,
-    Room, ScanBuild, SetAside, WrittenPatient, build, write_patient,
+    Room, SLICES, ScanBuild, SetAside, WrittenPatient, build, write_patient,
 };
 use needlebench_bench::{Control, Stop};
 use needlebench_imaging::markers::MarkerModel;
@@ -17,7 +17,8 @@ use needlebench_imaging::read::{ReadVolume, read_label_names};
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker, Registration};
 use needlebench_imaging::{LesionSeed, SurfaceSizes};
 use needlebench_input::Finding;
-use needlebench_report::picture::{SlicePicture, slice_pictures};
+use needlebench_report::picture::{OVERVIEW, SlicePicture, scan_pictures};
+use needlebench_report::table::overview::overview_text;
 use needlebench_scenario::scenario::{GoalSection, Posture, Target};
 use needlebench_scenario::{
     MarkerFrame, MarkerList, Overrides, load_open_scenario, name_from_file, resolve_open_scenario,
@@ -45,7 +46,7 @@ Writes into DIR:
   surfaces/           closed surfaces as STL, mm, LPS
   labels.nii.gz       label map; names in labels.json
   volume.nii.gz       the volume aligned with the patient's axes, for `view`
-  slices/             images of slices with the outlines of the surfaces
+  slices/             images of slices with the outlines of the surfaces; overview.png has all of it in one
   report.json         surfaces with their distance from the voxels, lesions, markers, registration, errors; m and rad
 
 Positions are in the LPS frame of the scan (left, posterior, superior), mm. 3D Slicer shows RAS: change the sign of its
@@ -523,7 +524,7 @@ fn goals(arguments: &BuildArguments, built: &ScanBuild) -> Vec<GoalSection> {
 
 /// Images of slices: their names and bytes.
 fn slices(built: &ScanBuild, out: &Path) -> Result<Vec<(String, Vec<u8>)>, Stop> {
-    let pictures = slice_pictures(built).map_err(|error| {
+    let pictures = scan_pictures(built).map_err(|error| {
         let file = out.display().to_string();
         Stop::from(Finding::new(file, format!("no images of slices: {error}")).key("--out"))
     })?;
@@ -547,20 +548,7 @@ fn in_words(
         "{}: {columns} x {rows} x {slices} voxels of {x:.3} x {y:.3} x {z:.3} mm",
         report.source.format
     )?;
-    write!(
-        text,
-        "\n\nsurface            triangles  volume (ml)  P99 to voxels (mm)"
-    )?;
-    for surface in &report.surfaces {
-        write!(
-            text,
-            "\n{:<18} {:>9}  {:>11.1}  {:>18.3}",
-            surface.name,
-            surface.triangles,
-            surface.volume_m3 * 1e6,
-            surface.distance_from_voxels.p99_m * 1e3
-        )?;
-    }
+    write!(text, "\n\n{}", overview_text(&report.overview))?;
     for lesion in &report.lesions {
         match lesion.size {
             Some(size) => {
@@ -598,6 +586,13 @@ fn in_words(
         write!(
             text,
             "\nnote: no lesion, so the scenario has no goals: add --lesion NAME=X,Y,Z, or write [[goals]]"
+        )?;
+    }
+    if arguments.pictures.are_wanted(true) {
+        write!(
+            text,
+            "\npicture: {}",
+            shown(&out.join(SLICES).join(OVERVIEW))
         )?;
     }
     write!(text, "\nresults: {}", shown(out))?;
