@@ -13,6 +13,7 @@ use serde::Deserialize;
 
 use super::digest::voxels_sha256;
 use super::files::{LABELS_FILE, NAMES_FILE, REPORT_FILE, VOLUME_FILE};
+use super::overview::OverviewRow;
 use crate::Stop;
 
 /// Farthest that a corner of the volume may be from where the report has it, m: a file has single precision.
@@ -39,6 +40,9 @@ pub struct BuildFacts {
     voxels_sha256: Option<String>,
     #[serde(default)]
     labels_sha256: Option<String>,
+    /// What was found, and what is not known; nothing in reports of former versions.
+    #[serde(default)]
+    pub overview: Vec<OverviewRow>,
     /// Closed surfaces.
     pub surfaces: Vec<SurfaceFacts>,
     /// Markers, if they were looked for.

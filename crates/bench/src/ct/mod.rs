@@ -28,7 +28,7 @@ pub use files::{
     BuildFiles, BuildReport, ROUTES_FILE, SCENARIO_FILE, SESSION_FILE, SLICES, VOLUME_FILE,
 };
 pub use imaged::{Imaged, LastScan, imaged, scanned};
-pub use overview::{OverviewAccuracy, OverviewRow, OverviewSource};
+pub use overview::{OverviewAccuracy, OverviewRow, OverviewSource, unlabelled};
 pub use patient::{PatientFrame, Room};
 pub use scan_order::{CtSubject, ScanOrder, ScanRange, SyntheticScan};
 pub use touched::marker_list;

@@ -387,6 +387,36 @@ impl ScanBuild {
     }
 }
 
+/// What a needle may meet that no label map shows, as needle paths take it: with a zone below each bone, and with an
+/// organ between the lungs, or without.
+pub fn unlabelled(
+    overview: &[OverviewRow],
+    [has_rib_zone, has_mediastinum]: [bool; 2],
+) -> Vec<OverviewRow> {
+    let is_in_the_way = |row: &&OverviewRow| {
+        let is_within = !matches!(
+            row.tissue,
+            Some(SurfaceTissue::Skin | SurfaceTissue::Lesion | SurfaceTissue::Beside)
+        );
+        let is_structure = ![MARKERS, ENDS, BESIDE].contains(&row.name.as_str());
+        is_within && is_structure && row.source != OverviewSource::LabelMap
+    };
+    let rows = overview.iter().filter(is_in_the_way);
+    rows.map(|row| {
+        let is_off = match row.source {
+            OverviewSource::Modelled => !has_rib_zone,
+            OverviewSource::Assumed => !has_mediastinum,
+            _ => false,
+        };
+        if is_off {
+            missing(&row.name, &row.in_words, NOT_AVOIDED)
+        } else {
+            row.clone()
+        }
+    })
+    .collect()
+}
+
 /// Heart and great vessels: between the lungs if nothing shows them.
 fn heart(is_shown: &dyn Fn(&str) -> bool) -> Option<OverviewRow> {
     if is_shown("heart") && is_shown("aorta") {
@@ -425,6 +455,46 @@ fn words(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_no_label_map_shows_is_taken_as_the_rules_take_it() {
+        let row = |name: &str, source| OverviewRow {
+            source,
+            ..missing(name, name, "somewhere")
+        };
+        let overview = [
+            row("skin", OverviewSource::HuAndShape),
+            row("bone", OverviewSource::HuAndShape),
+            row("liver", OverviewSource::LabelMap),
+            row("mediastinum", OverviewSource::Assumed),
+            row("intercostal_vessels", OverviewSource::Modelled),
+            row(MARKERS, OverviewSource::NotSearched),
+        ];
+        let mut overview = overview;
+        overview[0].tissue = Some(SurfaceTissue::Skin);
+        let sources = |rules| {
+            let rows = unlabelled(&overview, rules);
+            let rows = rows.into_iter().map(|row| (row.name, row.source));
+            rows.collect::<Vec<_>>()
+        };
+        let named = |sources: [OverviewSource; 3]| {
+            let names = ["bone", "mediastinum", "intercostal_vessels"].map(str::to_owned);
+            names.into_iter().zip(sources).collect::<Vec<_>>()
+        };
+        use OverviewSource::{Assumed, HuAndShape, Modelled, NotFound};
+        assert_eq!(
+            sources([true, true]),
+            named([HuAndShape, Assumed, Modelled])
+        );
+        assert_eq!(
+            sources([false, true]),
+            named([HuAndShape, Assumed, NotFound])
+        );
+        assert_eq!(
+            sources([true, false]),
+            named([HuAndShape, NotFound, Modelled])
+        );
+    }
 
     #[test]
     fn heart_is_assumed_between_two_lungs_only() {

@@ -29,7 +29,16 @@ fn routes_in_a_scan_are_planned_with_the_robot_written_and_checked() {
     let bench = built();
     let arguments = "ct routes patient --directions 3000 --write patient/planned.toml --json";
     let found = bench.run(arguments).exits_with(0).json();
-    has_keys(&found, "schema_version ok findings targets remarks written");
+    has_keys(
+        &found,
+        "schema_version ok findings targets unlabelled remarks written",
+    );
+    let unlabelled = found["unlabelled"].list().iter();
+    let unlabelled: Vec<&str> = unlabelled.map(|row| row["name"].word()).collect();
+    for name in ["bone", "mediastinum", "intercostal_vessels"] {
+        assert!(unlabelled.contains(&name), "{unlabelled:?}");
+    }
+    assert!(!unlabelled.contains(&"skin") && !unlabelled.contains(&"markers"));
     let target = &found["targets"][0];
     assert_eq!(target["goal"], "nodule");
     assert_eq!(target["anatomy"], "voxels");

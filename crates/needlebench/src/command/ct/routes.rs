@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result};
 use clap::Args;
 use nalgebra::Vector3;
-use needlebench_bench::ct::{BuiltFolder, ROUTES_FILE, SCENARIO_FILE};
+use needlebench_bench::ct::{BuiltFolder, OverviewRow, ROUTES_FILE, SCENARIO_FILE, unlabelled};
 use needlebench_bench::routes::{
     RoutePlan, RouteTask, SOLID_DIRECTIONS, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free,
     plan_routes, rank,
@@ -16,9 +16,10 @@ use needlebench_bench::{Control, Stop};
 use needlebench_imaging::Remark;
 use needlebench_input::{Finding, read_text};
 use needlebench_report::files::{Folder, write_route_maps};
+use needlebench_report::table::overview::unlabelled_text;
 use needlebench_report::table::routes::routes_text;
 use needlebench_report::write_atomically;
-use needlebench_scenario::scenario::{GoalSection, Target};
+use needlebench_scenario::scenario::{GoalSection, NeedleRouteSection, Target};
 use needlebench_scenario::{
     OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, load_open_scenario, resolve_scenario,
 };
@@ -110,6 +111,8 @@ struct RoutesAnswer<'a> {
     /// Of the `report.json` of the patient's folder.
     build_sha256: Option<&'a str>,
     targets: &'a [RoutePlan],
+    /// What a needle may meet that no label map shows, and what stands for it.
+    unlabelled: &'a [OverviewRow],
     remarks: &'a [Remark],
     written: Option<String>,
 }
@@ -118,6 +121,7 @@ struct Found {
     name: String,
     build_sha256: Option<String>,
     plans: Vec<RoutePlan>,
+    unlabelled: Vec<OverviewRow>,
     remarks: Vec<Remark>,
     written: Option<PathBuf>,
 }
@@ -131,6 +135,7 @@ impl Found {
             scenario: Some(&self.name),
             build_sha256: self.build_sha256.as_deref(),
             targets: &self.plans,
+            unlabelled: &self.unlabelled,
             remarks: &self.remarks,
             written: self.written.as_deref().map(shown),
         }
@@ -174,6 +179,7 @@ pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus, Failure>
                 scenario: None,
                 build_sha256: None,
                 targets: &[],
+                unlabelled: &[],
                 remarks: &[],
                 written: None,
             };
@@ -216,7 +222,12 @@ fn written_files(arguments: &RoutesArguments, found: &Found) -> Result<Option<Pa
 }
 
 fn in_words(arguments: &RoutesArguments, found: &Found, folder: Option<&Path>) -> String {
-    let mut parts: Vec<String> = found.plans.iter().map(routes_text).collect();
+    let unlabelled = unlabelled_text(&found.unlabelled);
+    let mut parts: Vec<String> = (!unlabelled.is_empty())
+        .then_some(unlabelled)
+        .into_iter()
+        .collect();
+    parts.extend(found.plans.iter().map(routes_text));
     let mut last: Vec<String> = found
         .remarks
         .iter()
@@ -324,6 +335,23 @@ impl Patient {
         Ok(vec![section])
     }
 
+    /// What no label map shows, as the rules of all goals take it.
+    fn unlabelled(&self, arguments: &RoutesArguments) -> Result<Vec<OverviewRow>, Finding> {
+        let Some(built) = &self.built else {
+            return Ok(Vec::new());
+        };
+        let sections = self.sections(arguments)?;
+        let has_rib_zone = sections
+            .iter()
+            .all(|goal| goal.route.clone().unwrap_or_default().below_rib_mm > 0.0);
+        let off = &self.resolved.scenario.planning.needle_route.off;
+        let has_mediastinum = off
+            .iter()
+            .all(|name| name != NeedleRouteSection::MEDIASTINUM);
+        let overview = &built.facts().overview;
+        Ok(unlabelled(overview, [has_rib_zone, has_mediastinum]))
+    }
+
     fn with_robot(&self, arguments: &RoutesArguments) -> WithRobot {
         if arguments.no_robot {
             return WithRobot::No("by --no-robot".to_owned());
@@ -386,6 +414,7 @@ fn find(
         plans.push(plan);
     }
     let mut found = Found {
+        unlabelled: patient.unlabelled(arguments)?,
         name: patient.resolved.scenario.name.clone(),
         build_sha256: patient
             .built
