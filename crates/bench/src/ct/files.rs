@@ -226,6 +226,8 @@ impl<'b> LabelNames<'b> {
 pub struct BuildFiles {
     /// The label map with its names.
     pub labels: bool,
+    /// The label map as a segmentation of 3D Slicer, too.
+    pub segmentation: bool,
     /// The volume along the patient's axes: what everything was found in.
     pub volume: bool,
     /// Images of slices: name and bytes of each.
@@ -238,6 +240,8 @@ pub const SCENARIO_FILE: &str = "scenario.toml";
 pub const VOLUME_FILE: &str = "volume.nii.gz";
 /// Name of the label map there.
 pub(super) const LABELS_FILE: &str = "labels.nii.gz";
+/// The label map as a segmentation of 3D Slicer.
+pub(super) const SEGMENTATION_FILE: &str = "labels.seg.nrrd";
 /// Names of its labels.
 pub(super) const NAMES_FILE: &str = "labels.json";
 /// What was built.

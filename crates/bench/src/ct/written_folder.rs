@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use needlebench_imaging::write::{
-    TEMPORARY_PREFIX, stl_bytes, write_bytes, write_label_nifti, write_nifti,
+    TEMPORARY_PREFIX, stl_bytes, write_bytes, write_label_nifti, write_nifti, write_seg_nrrd,
 };
 use needlebench_imaging::{ImagingError, Remark};
 use needlebench_input::{from_toml, read_text, sha256_hex};
@@ -16,7 +16,7 @@ use super::ScanBuild;
 use super::built_folder::{BuildFacts, read_facts};
 use super::files::{
     BuildDigests, BuildFiles, BuildReport, LABELS_FILE, LabelNames, NAMES_FILE, REPORT_FILE,
-    ROUTES_FILE, SCENARIO_FILE, SESSION_FILE, SLICES, VOLUME_FILE, surface_file,
+    ROUTES_FILE, SCENARIO_FILE, SEGMENTATION_FILE, SESSION_FILE, SLICES, VOLUME_FILE, surface_file,
 };
 use super::patient::{Room, SURFACES, couch_left_out, patient_scenario};
 use crate::{Control, Stop};
@@ -158,6 +158,10 @@ fn images(
         write_label_nifti(&folder.join(LABELS_FILE), labels, control.cancel)?;
         write_json(&folder.join(NAMES_FILE), &LabelNames::of(labels))?;
     }
+    if wanted.segmentation {
+        let labels = &build.seen.made.labels;
+        write_seg_nrrd(&folder.join(SEGMENTATION_FILE), labels, control.cancel)?;
+    }
     if wanted.volume {
         write_nifti(
             &folder.join(VOLUME_FILE),
@@ -210,7 +214,7 @@ fn replace(
     for file in surfaces.filter(is_ours).filter(|file| !kept(file)) {
         remove(&folder.join(file))?;
     }
-    for file in [LABELS_FILE, NAMES_FILE, VOLUME_FILE] {
+    for file in [LABELS_FILE, NAMES_FILE, SEGMENTATION_FILE, VOLUME_FILE] {
         remove(&folder.join(file))?;
     }
     for inner in [SURFACES, SLICES, ""] {

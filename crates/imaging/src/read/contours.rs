@@ -33,8 +33,8 @@ struct Contour {
     at: f64,
 }
 
-/// Calls `paint` with the offset of each voxel whose centre is inside: within one plane by the even-odd rule, so that an
-/// inner contour is a hole. Planes that are nearest to the same slice are united.
+/// Calls `paint` with the offset of each voxel whose centre is inside: within one plane by the even-odd rule, so that
+/// an inner contour is a hole. Planes that are nearest to the same slice are united.
 ///
 /// # Errors
 /// Contours that lie across the slices.

@@ -20,8 +20,8 @@ pub struct ReadLabels {
     pub remarks: Vec<Remark>,
 }
 
-/// Reads a label map of the CT on `grid` from a DICOM segmentation or RT structure set, any format of volumes, or a folder
-/// with a mask of one structure in each file.
+/// Reads a label map of the CT on `grid` from a DICOM segmentation or RT structure set, any format of volumes, or a
+/// folder with a mask of one structure in each file.
 ///
 /// Its voxels must be the CT's, to 0.01 mm at the corners; axes may run the other way or be in another order. It may
 /// have a part of the CT's voxels, as 3D Slicer crops segmentations: the others have no label. Where segments overlap,

@@ -95,7 +95,8 @@ impl Painted {
         let several: u32 = self.several.iter().map(|bits| bits.count_ones()).sum();
         if several > 0 {
             remarks.push(Remark::new(format!(
-                "{several} voxels are in several structures: lesions before bone, vessels, organs, lungs and the outside"
+                "{several} voxels are in several structures: lesions before bone, vessels, organs, lungs \
+                 and the outside"
             )));
         }
         if !hidden.is_empty() {
@@ -133,11 +134,11 @@ pub(super) fn not_found(names: &[String]) -> Option<Remark> {
 /// Names for a sentence, not too many of them.
 pub(super) fn listed(names: &[String]) -> String {
     let first = names.iter().take(LISTED).map(|name| format!("`{name}`"));
-    let mut text = first.collect::<Vec<_>>().join(", ");
-    if names.len() > LISTED {
-        text += &format!(" and {} more", names.len() - LISTED);
+    let text = first.collect::<Vec<_>>().join(", ");
+    match names.len().checked_sub(LISTED) {
+        None | Some(0) => text,
+        Some(more) => format!("{text} and {more} more"),
     }
-    text
 }
 
 #[cfg(test)]

@@ -45,6 +45,7 @@ Writes into DIR:
   scenario.toml       ready for `run`, `check`, `suggest` and all other commands
   surfaces/           closed surfaces as STL, mm, LPS
   labels.nii.gz       label map; names in labels.json
+  labels.seg.nrrd     the same for 3D Slicer, with --seg-nrrd
   volume.nii.gz       the volume aligned with the patient's axes, for `view`
   slices/             images of slices with the outlines of the surfaces; overview.png has all of it in one
   report.json         surfaces with their distance from the voxels, lesions, markers, registration, errors; m and rad
@@ -103,6 +104,9 @@ pub(crate) struct BuildArguments {
     /// Do not write the label map.
     #[arg(long)]
     no_labels: bool,
+    /// Also write the label map as a segmentation of 3D Slicer with names and colours.
+    #[arg(long)]
+    seg_nrrd: bool,
     /// Do not write the volume; `view` requires it.
     #[arg(long)]
     no_volume: bool,
@@ -353,6 +357,7 @@ fn write<'b>(
 ) -> Result<WrittenPatient<'b>, Stop> {
     let mut files = BuildFiles {
         labels: !arguments.no_labels,
+        segmentation: arguments.seg_nrrd,
         volume: !arguments.no_volume,
         slices: Vec::new(),
     };
