@@ -1,6 +1,6 @@
 """The readers of volumes against nibabel, pydicom, SimpleITK and pynrrd: HU bit for bit, places to rounding, bad files answered.
 
-    check.py --reader target/release/dump_volume --program target/release/needlebench [--times]
+    check.py --reader target/release/dump_volume --labels target/release/dump_labels --program target/release/needlebench [--times]
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import dicom
+import label_maps
 import metaimage
 import mgh
 import nibabel as nib
@@ -92,6 +93,7 @@ def times(reader: Reader, folder: Path) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--reader", type=Path, required=True, help="example dump_volume")
+    parser.add_argument("--labels", type=Path, required=True, help="example dump_labels")
     parser.add_argument("--program", type=Path, help="needlebench")
     parser.add_argument("--times", action="store_true", help="measure, too")
     arguments = parser.parse_args()
@@ -114,6 +116,9 @@ def main() -> int:
             folder = made / name
             folder.mkdir()
             print(module.check(reader, folder), name, "files answered")
+        maps = made / "labels"
+        maps.mkdir()
+        print(label_maps.check(arguments.labels.resolve(), maps), "label maps are the same, and in pynrrd and SimpleITK")
         before = reader.answers
         dicom.geometries(reader, made / "dicom")
         dicom.compressed(reader, made / "dicom")
