@@ -2,6 +2,8 @@
 
 use needlebench_cell::part_in_words;
 use needlebench_imaging::{BesideKind, Label, LabelFacts, Surface, SurfaceTissue, structure_of};
+use needlebench_routing::Obstacle;
+use needlebench_scenario::scenario::{NeedleRouteSection, RouteSection};
 use serde::{Deserialize, Serialize};
 
 use super::{Registered, ScanBuild};
@@ -98,20 +100,21 @@ const fn expected(
 }
 
 const NOT_AVOIDED: &str = "not avoided";
+const ABSENT_LUNG: &str = "what is in its place";
 
 /// Said where nothing shows it.
-const EXPECTED: [Expected; 7] = [
+const EXPECTED: [Expected; 6] = [
     expected(
         "lung_left",
         "left lung",
         |row| row.name == "lung_left",
-        "mediastinum",
+        ABSENT_LUNG,
     ),
     expected(
         "lung_right",
         "right lung",
         |row| row.name == "lung_right",
-        "mediastinum",
+        ABSENT_LUNG,
     ),
     expected(
         "trachea",
@@ -130,12 +133,6 @@ const EXPECTED: [Expected; 7] = [
         "vessels",
         "vessels outside lungs",
         |row| is_of(row, SurfaceTissue::Vessel) && row.name != LUNG_VESSELS && !is_mammary(row),
-        NOT_AVOIDED,
-    ),
-    expected(
-        "mammary_vessels",
-        "mammary vessels",
-        is_mammary,
         NOT_AVOIDED,
     ),
 ];
@@ -157,6 +154,11 @@ fn is_mammary(row: &OverviewRow) -> bool {
 
 /// Organs below the diaphragm, which plain CT does not separate from what is around them.
 const ABDOMINAL: [&str; 4] = ["liver", "spleen", "stomach", "bowel"];
+
+/// What is modelled, and what is assumed: rows that needle paths may be told to leave out.
+const INTERCOSTAL: &str = "intercostal_vessels";
+const MAMMARY: &str = "mammary_vessels";
+const MEDIASTINUM: &str = "mediastinum";
 
 /// Rows that are no structures.
 const MARKERS: &str = "markers";
@@ -198,14 +200,14 @@ impl ScanBuild {
         if !abdominal.is_empty() {
             more.push(missing("abdominal", &abdominal.join(", "), NOT_AVOIDED));
         }
-        more.push(OverviewRow {
-            source: OverviewSource::Modelled,
-            ..missing(
-                "intercostal_vessels",
-                "intercostal vessels",
-                "below each bone",
-            )
-        });
+        more.push(modelled(
+            INTERCOSTAL,
+            "intercostal vessels",
+            "below each bone",
+        ));
+        if !rows.iter().any(|row| is_mammary(row)) {
+            more.push(modelled(MAMMARY, "mammary vessels", "beside the sternum"));
+        }
         rows.extend(more);
         rows.extend(self.of_lesions());
         let not_grown = self.seen.made.not_grown.iter();
@@ -285,7 +287,10 @@ impl ScanBuild {
         let structure = structure_of(&fact.name);
         let name = structure.as_ref().map_or(&fact.name, |it| &it.name).clone();
         let is_own = Label::ALL.iter().any(|label| label.name() == fact.name);
-        let has_surface = made.surfaces.iter().any(|surface| surface.name == name);
+        let has_surface = made
+            .surfaces
+            .iter()
+            .any(|surface| [&name, &fact.name].contains(&&surface.name));
         let is_lesion = made.lesions.iter().any(|it| it.lesion.name == fact.name);
         let is_soft = fact.name == Label::SoftTissue.name();
         let is_known = is_own || structure.is_some();
@@ -387,12 +392,21 @@ impl ScanBuild {
     }
 }
 
-/// What a needle may meet that no label map shows, as needle paths take it: with a zone below each bone, and with an
-/// organ between the lungs, or without.
+/// What a needle may meet that no label map shows, as needle paths take it by the rules of all `routes`, without the
+/// structures that are `off`.
 pub fn unlabelled(
     overview: &[OverviewRow],
-    [has_rib_zone, has_mediastinum]: [bool; 2],
+    routes: &[RouteSection],
+    off: &[String],
 ) -> Vec<OverviewRow> {
+    let is_off = |name: &str| off.iter().any(|each| each == name);
+    let vessels = is_off(Obstacle::Vessel.name());
+    let is_left_out = |name: &str| match name {
+        INTERCOSTAL => vessels || routes.iter().any(|route| route.below_rib_mm <= 0.0),
+        MAMMARY => vessels || routes.iter().any(|route| route.beside_sternum_mm <= 0.0),
+        MEDIASTINUM => is_off(Obstacle::Organ.name()) || is_off(NeedleRouteSection::MEDIASTINUM),
+        _ => false,
+    };
     let is_in_the_way = |row: &&OverviewRow| {
         let is_within = !matches!(
             row.tissue,
@@ -403,12 +417,11 @@ pub fn unlabelled(
     };
     let rows = overview.iter().filter(is_in_the_way);
     rows.map(|row| {
-        let is_off = match row.source {
-            OverviewSource::Modelled => !has_rib_zone,
-            OverviewSource::Assumed => !has_mediastinum,
-            _ => false,
-        };
-        if is_off {
+        let is_taken = matches!(
+            row.source,
+            OverviewSource::Modelled | OverviewSource::Assumed
+        );
+        if is_taken && is_left_out(&row.name) {
             missing(&row.name, &row.in_words, NOT_AVOIDED)
         } else {
             row.clone()
@@ -417,19 +430,28 @@ pub fn unlabelled(
     .collect()
 }
 
-/// Heart and great vessels: between the lungs if nothing shows them.
+/// Heart and great vessels if nothing shows them: between the lungs, or anywhere in the half of the chest without one.
 fn heart(is_shown: &dyn Fn(&str) -> bool) -> Option<OverviewRow> {
     if is_shown("heart") && is_shown("aorta") {
         return None;
     }
-    let row = |unknown| missing("mediastinum", "heart, great vessels", unknown);
-    if !is_shown("lung_left") || !is_shown("lung_right") {
-        return Some(row(NOT_AVOIDED));
-    }
+    let row = |unknown| missing(MEDIASTINUM, "heart, great vessels", unknown);
+    let place = match [is_shown("lung_left"), is_shown("lung_right")] {
+        [true, true] => "all between lungs",
+        [false, false] => return Some(row(NOT_AVOIDED)),
+        _ => "all beside the lung",
+    };
     Some(OverviewRow {
         source: OverviewSource::Assumed,
-        ..row("all between lungs")
+        ..row(place)
     })
+}
+
+fn modelled(name: &str, in_words: &str, place: &str) -> OverviewRow {
+    OverviewRow {
+        source: OverviewSource::Modelled,
+        ..missing(name, in_words, place)
+    }
 }
 
 fn missing(name: &str, in_words: &str, unknown: &str) -> OverviewRow {
@@ -466,49 +488,46 @@ mod tests {
             row("skin", OverviewSource::HuAndShape),
             row("bone", OverviewSource::HuAndShape),
             row("liver", OverviewSource::LabelMap),
-            row("mediastinum", OverviewSource::Assumed),
-            row("intercostal_vessels", OverviewSource::Modelled),
+            row(MEDIASTINUM, OverviewSource::Assumed),
+            row(INTERCOSTAL, OverviewSource::Modelled),
             row(MARKERS, OverviewSource::NotSearched),
         ];
         let mut overview = overview;
         overview[0].tissue = Some(SurfaceTissue::Skin);
-        let sources = |rules| {
-            let rows = unlabelled(&overview, rules);
+        let sources = |rib_zone_mm: f64, off: &[&str]| {
+            let route = RouteSection {
+                below_rib_mm: rib_zone_mm,
+                ..RouteSection::default()
+            };
+            let off: Vec<String> = off.iter().map(|&name| name.to_owned()).collect();
+            let rows = unlabelled(&overview, &[route], &off);
             let rows = rows.into_iter().map(|row| (row.name, row.source));
             rows.collect::<Vec<_>>()
         };
         let named = |sources: [OverviewSource; 3]| {
-            let names = ["bone", "mediastinum", "intercostal_vessels"].map(str::to_owned);
+            let names = ["bone", MEDIASTINUM, INTERCOSTAL].map(str::to_owned);
             names.into_iter().zip(sources).collect::<Vec<_>>()
         };
         use OverviewSource::{Assumed, HuAndShape, Modelled, NotFound};
+        assert_eq!(sources(3.0, &[]), named([HuAndShape, Assumed, Modelled]));
+        assert_eq!(sources(0.0, &[]), named([HuAndShape, Assumed, NotFound]));
         assert_eq!(
-            sources([true, true]),
-            named([HuAndShape, Assumed, Modelled])
-        );
-        assert_eq!(
-            sources([false, true]),
-            named([HuAndShape, Assumed, NotFound])
-        );
-        assert_eq!(
-            sources([true, false]),
+            sources(3.0, &[MEDIASTINUM]),
             named([HuAndShape, NotFound, Modelled])
         );
     }
 
     #[test]
-    fn heart_is_assumed_between_two_lungs_only() {
+    fn heart_is_assumed_beside_the_lungs() {
         let with = |names: &[&str]| {
             let row = heart(&|name| names.contains(&name));
             row.map(|row| row.source)
         };
         let both = ["lung_left", "lung_right"];
         assert_eq!(with(&both), Some(OverviewSource::Assumed));
-        assert_eq!(with(&both[..1]), Some(OverviewSource::NotFound));
-        assert_eq!(
-            with(&["heart", "lung_left"]),
-            Some(OverviewSource::NotFound)
-        );
+        assert_eq!(with(&both[..1]), Some(OverviewSource::Assumed));
+        assert_eq!(with(&["heart", "lung_left"]), Some(OverviewSource::Assumed));
+        assert_eq!(with(&["heart"]), Some(OverviewSource::NotFound));
         assert_eq!(with(&["heart", "aorta"]), None);
     }
 }

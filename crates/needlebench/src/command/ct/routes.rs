@@ -19,7 +19,7 @@ use needlebench_report::files::{Folder, write_route_maps};
 use needlebench_report::table::overview::unlabelled_text;
 use needlebench_report::table::routes::routes_text;
 use needlebench_report::write_atomically;
-use needlebench_scenario::scenario::{GoalSection, NeedleRouteSection, Target};
+use needlebench_scenario::scenario::{GoalSection, Target};
 use needlebench_scenario::{
     OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, load_open_scenario, resolve_scenario,
 };
@@ -341,15 +341,13 @@ impl Patient {
             return Ok(Vec::new());
         };
         let sections = self.sections(arguments)?;
-        let has_rib_zone = sections
+        let routes: Vec<_> = sections
             .iter()
-            .all(|goal| goal.route.clone().unwrap_or_default().below_rib_mm > 0.0);
+            .map(|goal| goal.route.clone().unwrap_or_default())
+            .collect();
         let off = &self.resolved.scenario.planning.needle_route.off;
-        let has_mediastinum = off
-            .iter()
-            .all(|name| name != NeedleRouteSection::MEDIASTINUM);
         let overview = &built.facts().overview;
-        Ok(unlabelled(overview, [has_rib_zone, has_mediastinum]))
+        Ok(unlabelled(overview, &routes, off))
     }
 
     fn with_robot(&self, arguments: &RoutesArguments) -> WithRobot {
