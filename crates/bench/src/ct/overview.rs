@@ -205,7 +205,7 @@ impl ScanBuild {
             "intercostal vessels",
             "below each bone",
         ));
-        if !rows.iter().any(|row| is_mammary(row)) {
+        if !rows.iter().any(is_mammary) {
             more.push(modelled(MAMMARY, "mammary vessels", "beside the sternum"));
         }
         rows.extend(more);
@@ -480,6 +480,7 @@ mod tests {
 
     #[test]
     fn what_no_label_map_shows_is_taken_as_the_rules_take_it() {
+        use OverviewSource::{Assumed, HuAndShape, Modelled, NotFound};
         let row = |name: &str, source| OverviewRow {
             source,
             ..missing(name, name, "somewhere")
@@ -508,7 +509,6 @@ mod tests {
             let names = ["bone", MEDIASTINUM, INTERCOSTAL].map(str::to_owned);
             names.into_iter().zip(sources).collect::<Vec<_>>()
         };
-        use OverviewSource::{Assumed, HuAndShape, Modelled, NotFound};
         assert_eq!(sources(3.0, &[]), named([HuAndShape, Assumed, Modelled]));
         assert_eq!(sources(0.0, &[]), named([HuAndShape, Assumed, NotFound]));
         assert_eq!(

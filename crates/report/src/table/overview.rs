@@ -80,7 +80,10 @@ pub fn unlabelled_text(unlabelled: &[OverviewRow]) -> String {
         };
         let names: Vec<String> = rows.map(with_place).collect();
         if !names.is_empty() {
-            text.push_str(&format!("\n  {words}: {}", names.join(", ")));
+            text += "\n  ";
+            text += words;
+            text += ": ";
+            text += &names.join(", ");
         }
     }
     if text.is_empty() {

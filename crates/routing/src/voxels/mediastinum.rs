@@ -40,36 +40,21 @@ impl Mediastinum {
         let is_bone = table(&|kind| kind == Kind::Bone);
         let [nx, ny, _] = labels.grid.size();
         let spacing_m = labels.grid.spacing_m();
-        let twice = || Some(2 * middle_of_body(labels, classes)?);
-        let has_one_lung = is_right.is_some() != is_left.is_some();
-        let between: Box<dyn Fn(&[u16]) -> Option<[usize; 2]>> = match (is_right, is_left) {
-            (Some(is_right), Some(is_left)) => Box::new(move |row| {
-                let last = last_in(row, &is_right)?;
-                let next = first_in(row, &is_left)?;
-                (last + 1 < next).then(|| [last + 1, next - 1])
-            }),
-            (Some(is_right), None) => {
-                let twice = twice()?;
-                Box::new(move |row| {
-                    let [first, last] = [first_in(row, &is_right)?, last_in(row, &is_right)?];
-                    let far = twice.saturating_sub(first).min(nx - 1);
-                    (last < far).then(|| [last + 1, far])
-                })
-            }
-            (None, Some(is_left)) => {
-                let twice = twice()?;
-                Box::new(move |row| {
-                    let [first, last] = [first_in(row, &is_left)?, last_in(row, &is_left)?];
-                    let far = twice.saturating_sub(last);
-                    (far < first).then(|| [far, first - 1])
-                })
-            }
+        let lungs = match (is_right, is_left) {
+            (Some(is_right), Some(is_left)) => Lungs::Both { is_right, is_left },
+            (Some(is_lung), None) | (None, Some(is_lung)) => Lungs::One {
+                is_lung,
+                twice_middle: 2 * middle_of_body(labels, classes)?,
+            },
             (None, None) => return None,
         };
         let (mut columns, mut fronts) = (Vec::new(), Vec::new());
         for k in within.first[2]..=within.last[2] {
             let slice = &labels.labels[k * nx * ny..(k + 1) * nx * ny];
-            let rows: Vec<Option<[usize; 2]>> = slice.chunks_exact(nx).map(&between).collect();
+            let rows: Vec<Option<[usize; 2]>> = slice
+                .chunks_exact(nx)
+                .map(|row| lungs.between(row))
+                .collect();
             let bone = |i: usize, j: usize| is_bone[usize::from(slice[j * nx + i])];
             fronts.push(front_of_spine(&rows, bone, SPINE_M / spacing_m[0], nx));
             columns.push(rows);
@@ -92,7 +77,7 @@ impl Mediastinum {
         Some(Self {
             first_slice: within.first[2],
             columns,
-            has_one_lung,
+            has_one_lung: matches!(lungs, Lungs::One { .. }),
         })
     }
 
@@ -110,6 +95,45 @@ impl Mediastinum {
     pub fn contains(&self, [i, j, k]: [usize; 3]) -> bool {
         let columns = self.columns(j, k);
         columns.is_some_and(|[first, last]| (first..=last).contains(&i))
+    }
+}
+
+/// The lungs of a map, by label.
+enum Lungs {
+    Both {
+        is_right: Vec<bool>,
+        is_left: Vec<bool>,
+    },
+    /// And twice the body's middle column.
+    One {
+        is_lung: Vec<bool>,
+        twice_middle: usize,
+    },
+}
+
+impl Lungs {
+    /// First and last column of what is between them in a row, or between the only one and where the other would end.
+    fn between(&self, row: &[u16]) -> Option<[usize; 2]> {
+        match self {
+            Self::Both { is_right, is_left } => {
+                let last = last_in(row, is_right)?;
+                let next = first_in(row, is_left)?;
+                (last + 1 < next).then(|| [last + 1, next - 1])
+            }
+            Self::One {
+                is_lung,
+                twice_middle,
+            } => {
+                let [first, last] = [first_in(row, is_lung)?, last_in(row, is_lung)?];
+                let mirrored = |column: usize| twice_middle.saturating_sub(column);
+                let [low, high] = if first + last < *twice_middle {
+                    [last + 1, mirrored(first).min(row.len() - 1)]
+                } else {
+                    [mirrored(last), first.checked_sub(1)?]
+                };
+                (low <= high).then_some([low, high])
+            }
+        }
     }
 }
 

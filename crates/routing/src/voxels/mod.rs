@@ -362,9 +362,10 @@ impl VoxelAnatomy {
             .all()
             .enumerate()
             .map(|(number, class)| {
-                let is_sternum = match has_sternum {
-                    true => sternum[number],
-                    false => class.kind == Kind::Bone && !cartilage[number],
+                let is_sternum = if has_sternum {
+                    sternum[number]
+                } else {
+                    class.kind == Kind::Bone && !cartilage[number]
                 };
                 if is_sternum {
                     mammary::Tissue::Bone

@@ -57,6 +57,10 @@ MARKERS.toml: frame = \"base_link\", \"base\" (as shown by the controller) or \"
 marker [[markers]] with name and position_mm. With \"base_link\" or \"base\" they register the robot to the patient.";
 
 #[derive(Debug, Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "switches of the command line"
+)]
 pub(crate) struct BuildArguments {
     /// A DICOM file or folder, NIfTI, NRRD, MetaImage, MGH, or a ZIP of one.
     #[arg(value_name = "PATH")]
