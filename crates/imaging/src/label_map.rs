@@ -246,6 +246,8 @@ pub(crate) fn complete(
     found.bone.bone.clone_from(&other);
     found.bone.bone.unite(&mapped);
     found.bone.blurred.subtract(&not_bone);
+    found.bone.contrast.subtract(&mapped);
+    found.bone.contrast.subtract(&not_bone);
     let cartilage = union_of(&|structure| structure.name == Label::Cartilage.name());
     if !cartilage.is_empty() {
         found.bone.cartilage = Mask::empty(cartilage.size());

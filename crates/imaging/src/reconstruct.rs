@@ -210,6 +210,8 @@ pub fn reconstruct(
     };
     given.retain(|each| is_solid(each, &found, &volume.grid, &mut remarks));
     let other_bone = complete(&mut found, &given, &volume.grid, &mut remarks)?;
+    let is_given = |name: &str| given.iter().any(|each| each.structure.name == name);
+    found.note_absent(volume, &is_given, &mut remarks);
     progress("lesions", 0.3);
     let mut seeds = options.lesions.clone();
     let mut lesions = mapped_lesions(&mut given, volume, &found, &mut seeds, cancel, &mut remarks)?;

@@ -54,7 +54,8 @@ pub fn in_order(
     Ok(Volume {
         grid,
         hu,
-        slice_thickness_m: volume.slice_thickness_m,
+        // Of slices along another axis of the patient nothing that asks for it would be right.
+        slice_thickness_m: volume.slice_thickness_m.filter(|_| axes[2].0 == 2),
     })
 }
 

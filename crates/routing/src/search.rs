@@ -228,6 +228,13 @@ fn throw(anatomy: &dyn Anatomy, rules: &RouteRules, ray: &Ray) -> Result<[f64; 3
     if let Some((_, distance_m, margin_m)) = worst(rules, &distances_m) {
         return Err(refuse(distance_m, margin_m));
     }
+    if !rules.cross_bullae && !anatomy.lungs(ray, from_to_m).bullae.is_empty() {
+        return Err(Refusal {
+            rule: RouteRule::Bulla,
+            value: 1.0,
+            limit: 0.0,
+        });
+    }
     match anatomy.leaves_lung_m(ray, rules.throw_m) {
         Some(behind_m) => Err(refuse(behind_m, rules.throw_m)),
         None => Ok(distances_m),

@@ -68,7 +68,7 @@ impl OverviewSource {
 pub enum OverviewAccuracy {
     /// 99 % of the surface is no farther from that of the voxels.
     SurfaceP99M(f64),
-    /// Half a voxel of the slice: the outline runs between voxels.
+    /// Half a voxel, along its longest edge: the outline runs between voxels.
     HalfVoxelM(f64),
     /// RMS error of the centroid.
     CentroidRmsM(f64),
@@ -266,8 +266,8 @@ impl ScanBuild {
     }
 
     fn half_voxel(&self) -> OverviewAccuracy {
-        let [x, y, _] = self.seen.volume.grid.spacing_m();
-        OverviewAccuracy::HalfVoxelM(0.5 * x.max(y))
+        let [x, y, z] = self.seen.volume.grid.spacing_m();
+        OverviewAccuracy::HalfVoxelM(0.5 * x.max(y).max(z))
     }
 
     fn contact(&self) -> Option<String> {
@@ -357,7 +357,7 @@ impl ScanBuild {
         let Some(found) = &self.seen.markers else {
             return OverviewRow {
                 source: OverviewSource::NotSearched,
-                ..missing(MARKERS, "markers", "place of the robot")
+                ..missing(MARKERS, "markers", "base placement")
             };
         };
         let used = |it: &Registered| it.registration.markers.len();

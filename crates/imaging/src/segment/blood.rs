@@ -7,8 +7,7 @@ use crate::morphology::{dilated, eroded};
 
 use super::Scan;
 use super::body::Body;
-use super::bone::{IN_FRONT, is_between};
-use super::lungs::{Lungs, grow_back};
+use super::lungs::{IN_FRONT, Lungs, grow_back, is_between};
 
 /// Great vessels are thicker than twice this, ribs and the sternum's halves are not, m.
 const CORE_M: f64 = 4e-3;
@@ -31,6 +30,9 @@ const LEAK_M: f64 = 2e-3;
 
 /// Marrow is surrounded by what is denser than it; blood is not. This share of the surroundings decides.
 const SHELL_SHARE: f64 = 0.4;
+
+/// Heart and great vessels are no wider than this share of the lungs; a skeleton of even density is.
+const WIDEST: f64 = 0.8;
 
 /// Where the descending aorta is, beside the spine: pools there are as dense as one in front, to this share.
 const BESIDE_SPINE: [f64; 2] = [0.75, 0.95];
@@ -58,6 +60,7 @@ pub(super) fn find(
     if core.parts().iter().all(|part| part.voxels < pool) {
         return Ok(none);
     }
+    let across = scan.axis_along(0);
     let (mut blood, mut levels) = (none.clone(), Vec::new());
     for shares in [IN_FRONT, BESIDE_SPINE] {
         for (number, _) in core
@@ -78,7 +81,9 @@ pub(super) fn find(
                 continue;
             }
             let found = pools(scan, dense, bounds, &seed, middle, &|part| {
-                is_between(scan, body, lungs, part, shares)
+                let wide = part.bounds.size()[across] as f64;
+                wide <= WIDEST * around.size()[across] as f64
+                    && is_between(scan, body, lungs, part, shares)
             })?;
             if !found.is_empty() {
                 levels.push(middle);
@@ -103,7 +108,7 @@ pub(super) fn find(
     let mut bone = scan.within(&with_blood, bounds, |hu| hu > brightest);
     bone.subtract(&blood);
     let mut halves = [blood, bone];
-    grow_back(scan, &mut halves, &with_blood);
+    grow_back(scan, &mut halves, &with_blood)?;
     let [blood, _] = halves;
     Ok(blood)
 }

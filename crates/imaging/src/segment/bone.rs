@@ -1,6 +1,6 @@
 //! Bone, and vessels with contrast medium.
 
-use crate::components::{Component, Components, Connectivity};
+use crate::components::{Components, Connectivity};
 use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::closed;
@@ -8,7 +8,7 @@ use crate::spacing::whole;
 use crate::surface::{local_level, refine};
 
 use super::body::Body;
-use super::lungs::Lungs;
+use super::lungs::{IN_FRONT, Lungs, is_between};
 use super::{Scan, blood, cartilage};
 
 /// Denser than soft tissue and blood without contrast medium.
@@ -47,9 +47,6 @@ const ON_SKIN_SHARE: f64 = 0.2;
 
 /// A part that is not surely bone or contrast medium and is worth a remark.
 const UNSURE_L: f64 = 1e-3;
-
-/// Of the depth of the lungs' box: in front of its back quarter, where the spine is.
-pub(super) const IN_FRONT: [f64; 2] = [0.1, 0.75];
 
 /// Bone and what is as dense. Masks are of the box.
 #[derive(Debug, Clone)]
@@ -127,10 +124,8 @@ pub(super) fn find(
             "no bone found: nothing in the body is denser than {SURE_HU} HU"
         )));
     }
-    let mut hard = blurred.clone();
-    hard.unite(&contrast);
     let (cartilage, cartilage_level_hu) =
-        cartilage::find(scan, body, lungs, &hard, &bounds, remarks)?;
+        cartilage::find(scan, body, lungs, [&blurred, &contrast], &bounds)?;
     Ok(Bone {
         bounds,
         bone,
@@ -203,39 +198,6 @@ fn near_outside(scan: &Scan<'_>, parts: &Components, body: &Body) -> Vec<usize> 
         }
     }
     counts
-}
-
-/// Whether a part lies between the lungs, where heart and great vessels are: its middle within the box of both, and
-/// between two shares of its depth.
-pub(super) fn is_between(
-    scan: &Scan<'_>,
-    body: &Body,
-    lungs: &Lungs,
-    part: &Component,
-    shares: [f64; 2],
-) -> bool {
-    let Some(mut bounds) = lungs.around() else {
-        return false;
-    };
-    if lungs.lungs.len() == 1 {
-        // The other half of the chest is as wide.
-        let across = scan.axis_along(0);
-        let far = 2.0 * (body.centroid[across] - body.bounds.first[across] as f64);
-        let mirrored = |index: usize| whole((far - index as f64).max(0.0));
-        let [first, last] = [bounds.first[across], bounds.last[across]];
-        bounds.first[across] = first.min(mirrored(last));
-        bounds.last[across] = last.max(mirrored(first));
-    }
-    let middle = part.centroid();
-    let within = |axis: usize| {
-        (bounds.first[axis] as f64..=bounds.last[axis] as f64).contains(&middle[axis])
-    };
-    let posterior = scan.axis_along(1);
-    let depth =
-        (middle[posterior] - bounds.first[posterior] as f64) / (bounds.size()[posterior] as f64);
-    let runs_back = scan.volume.grid.steps_m()[(1, posterior)] > 0.0;
-    let depth = if runs_back { depth } else { 1.0 - depth };
-    (0..3).all(within) && (shares[0]..shares[1]).contains(&depth)
 }
 
 fn note_unsure(

@@ -1,7 +1,7 @@
 //! Costal cartilage: denser than muscle, less dense than bone, as thick as a finger, and hanging on ribs or sternum.
 
 use crate::components::{Components, Connectivity};
-use crate::error::{ImagingError, Remark};
+use crate::error::ImagingError;
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::{dilated, eroded, opened};
 
@@ -34,6 +34,10 @@ const THICK_M: f64 = 11e-3;
 /// Share of a piece that may be thicker.
 const THICK_SHARE: f64 = 0.02;
 
+/// Share of a piece that may be as near to blood with contrast medium as cartilage is to bone: the wall of a heart is all
+/// around its blood.
+const BLOOD_SHARE: f64 = 0.1;
+
 /// How far it is from rib or sternum at most, m.
 const FROM_BONE_M: f64 = 4e-3;
 
@@ -41,19 +45,17 @@ const FROM_BONE_M: f64 = 4e-3;
 const LEAST_PIECE_L: f64 = 1e-3;
 
 /// All of it in an adult is 100 to 200 ml (assumed): with less than this, and both lungs, its absence is said, l.
-const USUAL_L: f64 = 20e-3;
+pub(super) const USUAL_L: f64 = 20e-3;
 
-/// Costal cartilage in a box, in the front half of the body, and the level between muscle and it; `dense` is bone and
-/// blood.
+/// Costal cartilage in a box, in the front half of the body, and the level between muscle and it.
 pub(super) fn find(
     scan: &Scan<'_>,
     body: &Body,
     lungs: &Lungs,
-    dense: &Mask,
+    [bone, blood]: [&Mask; 2],
     bounds: &IndexBox,
-    remarks: &mut Vec<Remark>,
 ) -> Result<(Mask, f64), ImagingError> {
-    let mut found = Mask::empty(dense.size());
+    let mut found = Mask::empty(bone.size());
     let Some(front) = front(scan, body, lungs, bounds) else {
         return Ok((found, USUAL_LEVEL_HU));
     };
@@ -66,21 +68,26 @@ pub(super) fn find(
         return Ok((found, USUAL_LEVEL_HU));
     };
     let level = f64::from(muscle_hu) + ABOVE_MUSCLE_HU;
-    let bone = dense.cropped(&front);
+    let (bone, blood) = (bone.cropped(&front), blood.cropped(&front));
     let mut candidates = smooth_above(scan, &within, level);
     candidates.intersect(&here);
     scan.check()?;
     // Around bone, its blur is as dense as cartilage.
     let layer_m = 1.01 * scan.spacing_m[0].max(scan.spacing_m[1]);
     candidates.subtract(&bone);
+    candidates.subtract(&blood);
     let mut apart = candidates.clone();
-    apart.subtract(&dilated(&bone, layer_m, scan.spacing_m));
+    for dense in [&bone, &blood] {
+        apart.subtract(&dilated(dense, layer_m, scan.spacing_m));
+    }
     // At least a layer of voxels within the slice.
     let thin_m = THIN_M.max(layer_m);
     let core = opened(&apart, thin_m, scan.spacing_m);
     scan.check()?;
     let thick = eroded(&core, THICK_M, scan.spacing_m);
-    let near_bone = dilated(&bone, FROM_BONE_M.max(2.0 * layer_m), scan.spacing_m);
+    let near_m = FROM_BONE_M.max(2.0 * layer_m);
+    let near_bone = dilated(&bone, near_m, scan.spacing_m);
+    let near_blood = dilated(&blood, near_m, scan.spacing_m);
     let pieces = Components::of(&apart, Connectivity::Faces);
     let mut facts = vec![Piece::default(); pieces.parts().len()];
     for (part, [from, to], j, k) in pieces.runs() {
@@ -88,6 +95,7 @@ pub(super) fn find(
         facts[part].core += count(&core);
         facts[part].thick += count(&thick);
         facts[part].near_bone += count(&near_bone);
+        facts[part].near_blood += count(&near_blood);
     }
     let least = scan.voxels_of(LEAST_PIECE_L);
     let mut whole = pieces.mask_of(|part| {
@@ -96,27 +104,23 @@ pub(super) fn find(
             && piece.core > 0
             && piece.near_bone > 0
             && piece.thick as f64 <= THICK_SHARE * voxels as f64
+            && piece.near_blood as f64 <= BLOOD_SHARE * voxels as f64
     });
     // What hangs on it by noise alone is none; what the opening took off its corners, and what is next to bone, is.
     whole.intersect(&core);
     whole = dilated(&whole, 2.0 * layer_m, scan.spacing_m);
     whole.intersect(&candidates);
     found.unite_within(&front, &whole);
-    if scan.litres(found.count()) < USUAL_L && lungs.lungs.len() == 2 {
-        remarks.push(Remark::new(
-            "hardly any costal cartilage found (muscle-like density, noise, or calcified): a route beside the sternum \
-             may pass some",
-        ));
-    }
     Ok((found, level))
 }
 
-/// What is known of a piece: its voxels that are in no thin part, in a thick one, near bone.
+/// What is known of a piece: its voxels that are in no thin part, in a thick one, near bone, near blood.
 #[derive(Debug, Clone, Copy, Default)]
 struct Piece {
     core: usize,
     thick: usize,
     near_bone: usize,
+    near_blood: usize,
 }
 
 /// In front of the middle of the body, from above the lungs to below them, in indices of the body's box; none without

@@ -1,9 +1,10 @@
 //! Lungs, airways and the vessels in the lungs.
 
-use crate::components::{Components, Connectivity};
+use crate::components::{Component, Components, Connectivity};
 use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask, pack_row};
 use crate::morphology::{bridged, dilated, eroded};
+use crate::spacing::whole;
 
 use super::body::Body;
 use super::{Scan, side_in_words};
@@ -36,10 +37,10 @@ const AIRWAYS_L: [f64; 2] = [2e-3, 0.2];
 /// Trachea and main bronchi are at least so long.
 const AIRWAY_LENGTH_M: f64 = 30e-3;
 
-/// The trachea, and not gas in a stomach: at most this section, m^2,
-const TRACHEA_SECTION_M2: f64 = 7e-4;
+/// Airways, and not gas in a stomach or in the pleura, have at most this section over their length, m^2.
+const AIRWAY_SECTION_M2: f64 = 7e-4;
 
-/// its middle so near to the middle between the lungs, m,
+/// The trachea has its middle so near to the midline, m,
 const TRACHEA_ASIDE_M: f64 = 30e-3;
 
 /// and above this share of their height, or this long, m: also that of a patient who is upside down in the file.
@@ -64,10 +65,13 @@ const BEHIND_SHARE: f64 = 0.1;
 const UNEQUAL: f64 = 0.65;
 
 /// Bone about the midline by which a spine is seen, l.
-const SPINE_L: f64 = 0.03;
+const SPINE_L: f64 = 0.06;
 
 /// Half of the width in which it is summed up, m.
 const SPINE_M: f64 = 25e-3;
+
+/// The midline is at least so far from the side of a chest that is not cut, m (assumed for adults).
+const HALF_CHEST_M: f64 = 0.1;
 
 /// Which lung.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -120,6 +124,9 @@ pub struct Lungs {
     pub air_hu: Option<i16>,
 }
 
+/// Of the depth of the lungs' box: in front of its back quarter, where the spine is.
+pub(super) const IN_FRONT: [f64; 2] = [0.1, 0.75];
+
 impl Lungs {
     /// The least box around the lungs, as indices of the masks; none without lungs.
     pub(super) fn around(&self) -> Option<IndexBox> {
@@ -150,9 +157,6 @@ pub(super) fn find(
         air_hu: scan.median(&candidates, &bounds),
     };
     let Some(air_hu) = lungs.air_hu else {
-        remarks.push(Remark::new(format!(
-            "no lungs found: no enclosed air of {LEAST_LUNG_L} l"
-        )));
         return Ok(lungs);
     };
     let midline = midline(scan, body);
@@ -192,7 +196,7 @@ pub(super) fn find(
     lungs.no_lung.intersect(&no_lung);
     note_no_lung(scan, &lungs, midline, remarks);
     lungs.gas.subtract(&lungs.airways);
-    note_missing(scan, &lungs, remarks);
+    note_cut(scan, &lungs, remarks);
     Ok(lungs)
 }
 
@@ -211,7 +215,19 @@ fn separate(lungs: &mut Lungs, airy: &Mask) {
     lungs.vessels.subtract(airy);
 }
 
-fn note_missing(scan: &Scan<'_>, lungs: &Lungs, remarks: &mut Vec<Remark>) {
+/// Lungs that were not found, or have little air. `is_given` says what a label map has.
+pub(super) fn note_absent(
+    lungs: &Lungs,
+    is_given: &dyn Fn(&str) -> bool,
+    remarks: &mut Vec<Remark>,
+) {
+    let sides = [Side::Left, Side::Right];
+    let has = |side: &Side| {
+        lungs.lungs.iter().any(|lung| lung.side == *side) || is_given(side.structure())
+    };
+    if sides.iter().all(has) && sides.iter().any(|side| is_given(side.structure())) {
+        return;
+    }
     match &lungs.lungs[..] {
         [] => remarks.push(Remark::new(format!(
             "no lung with {LEAST_LUNG_L} l of air found"
@@ -242,6 +258,9 @@ fn note_missing(scan: &Scan<'_>, lungs: &Lungs, remarks: &mut Vec<Remark>) {
         }
         _ => {}
     }
+}
+
+fn note_cut(scan: &Scan<'_>, lungs: &Lungs, remarks: &mut Vec<Remark>) {
     for lung in lungs.lungs.iter().filter(|lung| lung.cut) {
         let ends = [0, scan.size()[2] - 1];
         let side = side_in_words(
@@ -297,21 +316,37 @@ fn midline(scan: &Scan<'_>, body: &Body) -> f64 {
     }
     let within = body.mask.cropped(&body.bounds);
     let mut counts = vec![0_usize; body.bounds.size()[axis]];
-    for voxel in scan
-        .denser(&within, &body.bounds, scan.levels.bone_hu)
-        .voxels()
-    {
-        counts[voxel[axis]] += 1;
+    // In the back half: in front of it a heart with contrast medium is as dense.
+    let depth = scan.axis_along(1);
+    let centre = body.centroid[depth] - body.bounds.first[depth] as f64;
+    let runs_back = scan.volume.grid.steps_m()[(1, depth)] > 0.0;
+    let dense = scan.denser(&within, &body.bounds, scan.levels.bone_hu);
+    for voxel in dense.voxels() {
+        if (voxel[depth] as f64 > centre) == runs_back {
+            counts[voxel[axis]] += 1;
+        }
     }
+    // What is missing is on the side that is cut: the midline is not nearer to the other side than the middle of the rest.
+    let aside = scan.voxels_across(HALF_CHEST_M, axis) as f64;
+    let is_at_end = is_cut("left") == runs_left(scan, axis);
+    let is_towards_cut = |at: usize| {
+        let at = at as f64;
+        if is_at_end {
+            at >= middle.max(aside)
+        } else {
+            at <= middle.min(counts.len() as f64 - aside)
+        }
+    };
     let half = scan.voxels_across(SPINE_M, axis);
     let around = |at: usize| -> usize {
         let last = (at + half).min(counts.len() - 1);
         counts[at.saturating_sub(half)..=last].iter().sum()
     };
-    let best = (0..counts.len()).max_by_key(|&at| (around(at), usize::MAX - at));
+    let best = (0..counts.len()).filter(|&at| is_towards_cut(at));
+    let best = best.max_by_key(|&at| (around(at), usize::MAX - at));
     match best.filter(|&at| scan.litres(around(at)) >= SPINE_L) {
         Some(at) => at as f64,
-        None if is_cut("left") == runs_left(scan, axis) => counts.len() as f64,
+        None if is_at_end => counts.len() as f64,
         None => 0.0,
     }
 }
@@ -331,7 +366,7 @@ fn empty_air(
     let contrast = lung_hu.saturating_add(1000);
     if contrast < AIRWAY_CONTRAST_HU {
         remarks.push(Remark::new(format!(
-            "the air in the lungs is at {lung_hu} HU, as in the airways: they were not separated"
+            "the air in the lungs is at {lung_hu} HU, as in the airways: neither these nor a pneumothorax were separated"
         )));
         return (none.clone(), none, None);
     }
@@ -350,14 +385,12 @@ fn empty_air(
     let aside_m = |part: usize| {
         (parts.parts()[part].centroid()[across] - midline).abs() * scan.spacing_m[across]
     };
-    let is_trachea = |part: usize, length_m: f64| {
+    let is_trachea = |part: usize| {
         let each = &parts.parts()[part];
         let height = (each.centroid()[up] - around.first[up] as f64) / around.size()[up] as f64;
         let runs_up = scan.volume.grid.steps_m()[(2, up)] > 0.0;
         let height = if runs_up { height } else { 1.0 - height };
-        let section_m2 = each.voxels as f64 * scan.voxel_m3() / length_m;
-        section_m2 <= TRACHEA_SECTION_M2
-            && aside_m(part) <= TRACHEA_ASIDE_M
+        aside_m(part) <= TRACHEA_ASIDE_M
             && (height >= TRACHEA_ABOVE
                 || each.bounds.size()[up] as f64 * scan.spacing_m[up] >= TRACHEA_LENGTH_M)
     };
@@ -369,7 +402,8 @@ fn empty_air(
         let litres = scan.litres(each.voxels);
         (AIRWAYS_L[0]..=AIRWAYS_L[1]).contains(&litres)
             && length_m >= AIRWAY_LENGTH_M
-            && (is_trachea(part, length_m) || in_lungs[part] && aside_m(part) <= NO_AIRWAY_M)
+            && each.voxels as f64 * scan.voxel_m3() / length_m <= AIRWAY_SECTION_M2
+            && (is_trachea(part) || in_lungs[part] && aside_m(part) <= NO_AIRWAY_M)
     };
     // The rim of their inside is as dense as lung by partial volume.
     let layer_m = 1.5 * scan.spacing_m[0].max(scan.spacing_m[1]);
@@ -568,7 +602,7 @@ fn split(
             continue;
         }
         let mut halves = [one, other].map(|part| pieces.mask_of(|each| each == part));
-        grow_back(scan, &mut halves, mask);
+        grow_back(scan, &mut halves, mask)?;
         let how = format!(
             "where their connection is narrowest, at most {:.1} mm wide",
             2.0 * radius_mm
@@ -585,8 +619,45 @@ fn split(
     ))
 }
 
+/// Whether a part lies between the lungs, where heart and great vessels are: its middle within the box of both, and
+/// between two shares of its depth.
+pub(super) fn is_between(
+    scan: &Scan<'_>,
+    body: &Body,
+    lungs: &Lungs,
+    part: &Component,
+    shares: [f64; 2],
+) -> bool {
+    let Some(mut bounds) = lungs.around() else {
+        return false;
+    };
+    if lungs.lungs.len() == 1 {
+        // The other half of the chest is as wide.
+        let across = scan.axis_along(0);
+        let far = 2.0 * (body.centroid[across] - body.bounds.first[across] as f64);
+        let mirrored = |index: usize| whole((far - index as f64).max(0.0));
+        let [first, last] = [bounds.first[across], bounds.last[across]];
+        bounds.first[across] = first.min(mirrored(last));
+        bounds.last[across] = last.max(mirrored(first));
+    }
+    let middle = part.centroid();
+    let within = |axis: usize| {
+        (bounds.first[axis] as f64..=bounds.last[axis] as f64).contains(&middle[axis])
+    };
+    let posterior = scan.axis_along(1);
+    let depth =
+        (middle[posterior] - bounds.first[posterior] as f64) / (bounds.size()[posterior] as f64);
+    let runs_back = scan.volume.grid.steps_m()[(1, posterior)] > 0.0;
+    let depth = if runs_back { depth } else { 1.0 - depth };
+    (0..3).all(within) && (shares[0]..shares[1]).contains(&depth)
+}
+
 /// Grows two masks within a third one, a layer at a time in turn, until all that they reach is theirs.
-pub(super) fn grow_back(scan: &Scan<'_>, halves: &mut [Mask; 2], within: &Mask) {
+pub(super) fn grow_back(
+    scan: &Scan<'_>,
+    halves: &mut [Mask; 2],
+    within: &Mask,
+) -> Result<(), ImagingError> {
     let layer_m = 1.01 * scan.spacing_m.iter().copied().fold(0.0, f64::max);
     loop {
         let mut grew = false;
@@ -597,8 +668,9 @@ pub(super) fn grow_back(scan: &Scan<'_>, halves: &mut [Mask; 2], within: &Mask) 
             grew |= grown != halves[turn];
             halves[turn] = grown;
         }
+        scan.check()?;
         if !grew {
-            return;
+            return Ok(());
         }
     }
 }

@@ -46,6 +46,27 @@ pub struct Segmentation {
     pub remarks: Vec<Remark>,
 }
 
+impl Segmentation {
+    /// Says what was not found; `is_given` tells what a label map has.
+    pub(crate) fn note_absent(
+        &self,
+        volume: &Volume,
+        is_given: &dyn Fn(&str) -> bool,
+        remarks: &mut Vec<Remark>,
+    ) {
+        lungs::note_absent(&self.lungs, is_given, remarks);
+        let voxel_l = 1e3 * volume.grid.steps_m().determinant().abs();
+        let cartilage_l = self.bone.cartilage.count() as f64 * voxel_l;
+        let is_known = is_given(Label::Cartilage.name());
+        if !is_known && self.lungs.lungs.len() == 2 && cartilage_l < cartilage::USUAL_L {
+            remarks.push(Remark::new(
+                "hardly any costal cartilage found (muscle-like density, noise, or calcified): a route beside the \
+                 sternum may pass some",
+            ));
+        }
+    }
+}
+
 /// Where surfaces run, HU: at half-integers, so that no voxel is on them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Levels {

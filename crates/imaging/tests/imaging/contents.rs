@@ -1,7 +1,7 @@
 //! Blood with contrast medium, cartilage, gas and lungs that are not as usual, in a chest of analytic solids.
 
 use nalgebra::Point3;
-use needlebench_imaging::{Label, Reconstruction, Side, SurfaceTissue};
+use needlebench_imaging::{Label, Reconstruction, Side, SurfaceTissue, Volume, VoxelGrid};
 
 use super::reconstruct::{MM, Solid, chest, grid, options, render, run};
 
@@ -77,15 +77,70 @@ fn blood_with_contrast_medium_that_touches_the_spine_is_no_bone() {
 
 #[test]
 fn dense_marrow_in_its_shell_is_bone() {
+    // Between heart and spine, where pools are looked for.
+    const MIDDLE_MM: f64 = 20.0;
+    let within = |radius: f64| -> Box<dyn Fn(&nalgebra::Vector3<f64>) -> bool> {
+        Box::new(move |p| libm::hypot(p.x, p.y - MIDDLE_MM) <= radius)
+    };
     for hu in [220.0, 300.0, 400.0] {
-        let mut solids = chest();
-        solids.push(Solid(
-            Box::new(|p| libm::hypot(p.x, p.y - 66.0) <= 13.0),
-            hu,
-        ));
-        let made = run(&render(&solids, grid()), &options()).unwrap();
-        assert_eq!(ml(&made, Label::ContrastVessels), 0.0, "{hu} HU");
-        assert_eq!(label_at(&made, [0.0, 66.0, 0.0]), Label::Bone as u16);
+        for has_shell in [true, false] {
+            let mut solids = chest();
+            solids.push(ball([0.0, -25.0, 0.0], HEART_MM, hu));
+            if has_shell {
+                solids.push(Solid(within(17.0), 800.0));
+            }
+            solids.push(Solid(within(13.0), hu));
+            let made = run(&render(&solids, grid()), &options()).unwrap();
+            let wanted = if has_shell {
+                Label::Bone
+            } else {
+                Label::ContrastVessels
+            };
+            let found = label_at(&made, [0.0, MIDDLE_MM, 0.0]);
+            assert_eq!(found, wanted as u16, "{hu} HU, shell {has_shell}");
+            let heart = label_at(&made, [0.0, -25.0, 0.0]);
+            assert_eq!(heart, Label::ContrastVessels as u16, "{hu} HU");
+        }
+    }
+}
+
+/// Without what is to the left of a plane.
+fn cut_left(volume: &Volume, from: usize) -> Volume {
+    let [nx, ny, nz] = volume.grid.size();
+    let rows = volume.hu.chunks_exact(nx);
+    Volume {
+        grid: VoxelGrid::new(
+            [from, ny, nz],
+            *volume.grid.steps_m(),
+            volume.grid.ct_from_index(&Point3::origin()),
+        )
+        .unwrap(),
+        hu: rows.flat_map(|row| row[..from].to_vec()).collect(),
+        slice_thickness_m: None,
+    }
+}
+
+#[test]
+fn a_lung_in_a_narrow_field_of_view_keeps_its_side() {
+    let mut solids = chest();
+    // Ribs at the right side are denser than what is seen of the spine.
+    solids.push(Solid(
+        Box::new(|p| {
+            let wall = libm::hypot(p.x / 140.0, p.y / 92.0);
+            (0.93..1.0).contains(&wall) && p.x < -60.0
+        }),
+        700.0,
+    ));
+    let whole = render(&solids, grid());
+    // The grid's middle is the body's: with the spine, and without it.
+    for columns in [86, 66, 60] {
+        let made = run(&cut_left(&whole, columns), &options()).unwrap();
+        let lungs = &made.segmentation.lungs.lungs;
+        assert!(
+            matches!(&lungs[..], [lung] if lung.side == Side::Right),
+            "{columns} columns: {:?}",
+            made.remarks
+        );
     }
 }
 

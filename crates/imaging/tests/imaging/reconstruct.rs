@@ -283,7 +283,7 @@ fn one_lung_and_none_are_said() {
     let mut solids = body_and_bed();
     let made = run(&render(&solids, grid()), &options()).unwrap();
     assert!(made.segmentation.lungs.lungs.is_empty());
-    assert!(remarks(&made).contains("no lungs found"));
+    assert!(remarks(&made).contains("no lung with 0.3 l of air found"));
     solids.push(left_lung());
     let made = run(&render(&solids, grid()), &options()).unwrap();
     assert!(matches!(

@@ -24,8 +24,7 @@ impl Mediastinum {
     /// Of a label map along the patient's axes (columns to the left, rows to the back) with a lung; none without.
     ///
     /// In a row of a slice it is what lies between the last voxel of the right lung and the first of the left one. Where
-    /// one lung is absent, heart and vessels may be anywhere in its half of the chest: that is in it, as wide as the other
-    /// lung on its side of the spine.
+    /// one lung is absent, heart and vessels may be anywhere in its half of the chest: that is in it, to the skin.
     pub fn of(labels: &LabelMap, classes: &Classes, within: &IndexBox) -> Option<Self> {
         let kind = |label: u16| classes.get(classes.of_label(label)).kind;
         // Tables of a byte per label: every voxel is asked.
@@ -40,12 +39,11 @@ impl Mediastinum {
         let is_bone = table(&|kind| kind == Kind::Bone);
         let [nx, ny, _] = labels.grid.size();
         let spacing_m = labels.grid.spacing_m();
+        let is_body = table(&|kind| !matches!(kind, Kind::Outside | Kind::Beside));
         let lungs = match (is_right, is_left) {
             (Some(is_right), Some(is_left)) => Lungs::Both { is_right, is_left },
-            (Some(is_lung), None) | (None, Some(is_lung)) => Lungs::One {
-                is_lung,
-                twice_middle: 2 * middle_of_body(labels, classes)?,
-            },
+            (Some(is_lung), None) => Lungs::Right { is_lung, is_body },
+            (None, Some(is_lung)) => Lungs::Left { is_lung, is_body },
             (None, None) => return None,
         };
         let (mut columns, mut fronts) = (Vec::new(), Vec::new());
@@ -77,7 +75,7 @@ impl Mediastinum {
         Some(Self {
             first_slice: within.first[2],
             columns,
-            has_one_lung: matches!(lungs, Lungs::One { .. }),
+            has_one_lung: !matches!(lungs, Lungs::Both { .. }),
         })
     }
 
@@ -98,21 +96,25 @@ impl Mediastinum {
     }
 }
 
-/// The lungs of a map, by label.
+/// The lungs of a map, by label, and where only one is, what is of the body.
 enum Lungs {
     Both {
         is_right: Vec<bool>,
         is_left: Vec<bool>,
     },
-    /// And twice the body's middle column.
-    One {
+    Right {
         is_lung: Vec<bool>,
-        twice_middle: usize,
+        is_body: Vec<bool>,
+    },
+    Left {
+        is_lung: Vec<bool>,
+        is_body: Vec<bool>,
     },
 }
 
 impl Lungs {
-    /// First and last column of what is between them in a row, or between the only one and where the other would end.
+    /// First and last column of what is between them in a row; where one is absent, from the other one's side of the
+    /// chest to the skin: a lung may reach over to the other side, with the heart between its parts.
     fn between(&self, row: &[u16]) -> Option<[usize; 2]> {
         match self {
             Self::Both { is_right, is_left } => {
@@ -120,18 +122,11 @@ impl Lungs {
                 let next = first_in(row, is_left)?;
                 (last + 1 < next).then(|| [last + 1, next - 1])
             }
-            Self::One {
-                is_lung,
-                twice_middle,
-            } => {
-                let [first, last] = [first_in(row, is_lung)?, last_in(row, is_lung)?];
-                let mirrored = |column: usize| twice_middle.saturating_sub(column);
-                let [low, high] = if first + last < *twice_middle {
-                    [last + 1, mirrored(first).min(row.len() - 1)]
-                } else {
-                    [mirrored(last), first.checked_sub(1)?]
-                };
-                (low <= high).then_some([low, high])
+            Self::Right { is_lung, is_body } => {
+                Some([first_in(row, is_lung)?, last_in(row, is_body)?])
+            }
+            Self::Left { is_lung, is_body } => {
+                Some([first_in(row, is_body)?, last_in(row, is_lung)?])
             }
         }
     }

@@ -228,14 +228,31 @@ impl VoxelAnatomy {
                 self.target_lung = Some(lung);
                 self.touches_pleura = Some(false);
             }
+            // In emphysema, or in a vessel.
+            Kind::InLung => {
+                let mut lungs = [0_usize; 256];
+                for lung in (0..6).filter_map(|face| self.lung_towards(centre, face)) {
+                    lungs[usize::from(lung)] += 1;
+                }
+                let most = (0..=u8::MAX).max_by_key(|&lung| (lungs[usize::from(lung)], lung));
+                self.target_lung = most.filter(|&lung| lungs[usize::from(lung)] > 0);
+                self.touches_pleura = self.target_lung.map(|_| false);
+            }
             Kind::Lesion => {
                 let (mut faces, mut soft, mut lungs) = (0_usize, 0_usize, [0_usize; 256]);
                 for voxel in self.all_of(class) {
-                    for next in self.neighbours(voxel) {
+                    for face in 0..6 {
+                        let Some(next) = self.neighbour(voxel, face) else {
+                            continue;
+                        };
                         match self.kind_at(next) {
                             Kind::Lesion => continue,
                             Kind::Lung(lung) => lungs[usize::from(lung)] += 1,
-                            Kind::InLung => {}
+                            Kind::InLung => {
+                                if let Some(lung) = self.lung_towards(next, face) {
+                                    lungs[usize::from(lung)] += 1;
+                                }
+                            }
                             _ => soft += 1,
                         }
                         faces += 1;
@@ -343,7 +360,7 @@ impl VoxelAnatomy {
             return;
         }
         let is_inside = |class: &Class| match class.kind {
-            Kind::Lung(_) | Kind::InLung => true,
+            Kind::Lung(_) | Kind::InLung | Kind::Lesion => true,
             Kind::Organ => class.mark != Mark::Gas,
             _ => false,
         };
@@ -371,14 +388,16 @@ impl VoxelAnatomy {
                     mammary::Tissue::Bone
                 } else if is_inside(class) {
                     mammary::Tissue::Inside
+                } else if matches!(class.kind, Kind::Outside | Kind::Beside) {
+                    mammary::Tissue::Outside
                 } else {
                     mammary::Tissue::Other
                 }
             })
             .collect();
-        let Some(middle) = mediastinum::middle_of_body(labels, &self.classes) else {
-            return;
-        };
+        // Where it is labelled it is looked for everywhere.
+        let middle = mediastinum::middle_of_body(labels, &self.classes);
+        let middle = middle.filter(|_| !has_sternum);
         let tissue = |voxel| tissues[usize::from(self.voxels[self.offset(voxel)])];
         let found = mammary::beside_sternum(&self.within, self.spacing_m, middle, width_m, tissue);
         if found.is_empty() {
@@ -411,17 +430,27 @@ impl VoxelAnatomy {
             })
     }
 
-    fn neighbours(&self, voxel: [usize; 3]) -> impl Iterator<Item = [usize; 3]> + '_ {
-        (0..6_usize).filter_map(move |face| {
-            let mut next = voxel;
-            let axis = face / 2;
-            next[axis] = if face % 2 == 0 {
-                voxel[axis].checked_sub(1)?
-            } else {
-                voxel[axis] + 1
-            };
-            self.within.contains(next).then_some(next)
-        })
+    fn neighbour(&self, voxel: [usize; 3], face: usize) -> Option<[usize; 3]> {
+        let mut next = voxel;
+        let axis = face / 2;
+        next[axis] = if face.is_multiple_of(2) {
+            voxel[axis].checked_sub(1)?
+        } else {
+            voxel[axis] + 1
+        };
+        self.within.contains(next).then_some(next)
+    }
+
+    /// The first lung from a voxel on in the direction of one of its faces, through vessels and air without lung.
+    fn lung_towards(&self, voxel: [usize; 3], face: usize) -> Option<u8> {
+        let mut at = voxel;
+        loop {
+            match self.kind_at(at) {
+                Kind::Lung(lung) => return Some(lung),
+                Kind::InLung | Kind::Lesion => at = self.neighbour(at, face)?,
+                _ => return None,
+            }
+        }
     }
 
     fn mask_of(&self, wanted: impl Fn(&Class) -> bool) -> Mask {

@@ -15,7 +15,7 @@ use needlebench_bench::{Control, Stop};
 use needlebench_imaging::markers::MarkerModel;
 use needlebench_imaging::read::{ReadVolume, read_label_names};
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker, Registration};
-use needlebench_imaging::{LesionSeed, SurfaceSizes};
+use needlebench_imaging::{Label, LesionSeed, SurfaceSizes};
 use needlebench_input::Finding;
 use needlebench_report::picture::{OVERVIEW, SlicePicture, scan_pictures};
 use needlebench_report::table::overview::overview_text;
@@ -413,19 +413,8 @@ fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, St
     })
 }
 
-/// Reserved names of surfaces.
-const TAKEN: [&str; 10] = [
-    "skin",
-    "bone",
-    "other_bone",
-    "trachea",
-    "lung_left",
-    "lung_right",
-    "contrast_vessels",
-    "arms",
-    "couch",
-    "objects",
-];
+/// Reserved names of surfaces, beside those of labels.
+const TAKEN: [&str; 3] = ["skin", "other_bone", "trachea"];
 
 fn lesions(arguments: &BuildArguments, read: &ReadVolume) -> Result<Vec<LesionSeed>, Stop> {
     let file = arguments.path.display().to_string();
@@ -442,9 +431,11 @@ fn lesions(arguments: &BuildArguments, read: &ReadVolume) -> Result<Vec<LesionSe
     for seed in &all {
         *known.entry(&seed.name).or_default() += 1;
     }
+    let is_taken =
+        |name: &str| TAKEN.contains(&name) || Label::ALL.iter().any(|label| label.name() == name);
     if let Some((name, _)) = known
         .iter()
-        .find(|(name, count)| **count > 1 || TAKEN.contains(name))
+        .find(|(name, count)| **count > 1 || is_taken(name))
     {
         return Err(
             Finding::new(file, format!("the name `{name}` is already in use"))
