@@ -181,7 +181,13 @@ pub(super) fn in_several(voxels: u64) -> Remark {
     ))
 }
 
+/// Whether a name is a lesion's.
+pub(super) fn is_lesion(name: &str) -> bool {
+    structure_of(name).is_some_and(|structure| structure.tissue == SurfaceTissue::Lesion)
+}
+
 /// What a segment is called: its label; its coded type and side where the label has no known meaning and those have.
+/// One that is coded as a lesion has a lesion's name, whatever place its label names.
 pub(super) fn name_of(
     label: Option<&String>,
     coded_type: Option<String>,
@@ -192,17 +198,38 @@ pub(super) fn name_of(
         Some(side) => format!("{name} {side}"),
         None => name,
     });
-    let is_lesion = |name: &String| {
-        structure_of(name).is_some_and(|structure| structure.tissue == SurfaceTissue::Lesion)
-    };
-    // Lesions of one type are several: each keeps its own name, too.
-    let coded = match (coded, label) {
-        (Some(coded), Some(label)) if is_lesion(&coded) => Some(format!("{coded} {label}")),
-        (Some(coded), None) if is_lesion(&coded) => Some(format!("{coded} {number}")),
-        (coded, _) => coded,
-    };
+    if let Some(coded) = coded.as_ref().filter(|coded| is_lesion(coded)) {
+        // Lesions of one type are several: each keeps its own name, too.
+        return match label {
+            Some(label) if is_lesion(label) => label.clone(),
+            Some(label) => format!("{coded} {label}"),
+            None => format!("{coded} {number}"),
+        };
+    }
     let mut names = label.into_iter().chain(&coded);
     let known = names.find(|name| structure_of(name).is_some());
     let name = known.or(label).or(coded.as_ref());
     name.cloned().unwrap_or_else(|| format!("segment {number}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_coded_as_a_lesion_is_called_one_whatever_its_place() {
+        for (label, coded, wanted) in [
+            (Some("Lung left"), Some("Neoplasm"), "Neoplasm Lung left"),
+            (Some("liver"), Some("Mass"), "Mass liver"),
+            (Some("nodule 3"), Some("Neoplasm"), "nodule 3"),
+            (None, Some("Neoplasm"), "Neoplasm 7"),
+            (Some("Lung left"), Some("Organ"), "Lung left"),
+            (Some("thing"), Some("Liver"), "Liver"),
+            (None, None, "segment 7"),
+        ] {
+            let label = label.map(str::to_owned);
+            let name = name_of(label.as_ref(), coded.map(str::to_owned), None, 7);
+            assert_eq!(name, wanted);
+        }
+    }
 }

@@ -10,7 +10,7 @@ use super::file::OpenedFile;
 use super::{DEPTH, collect, tag};
 use crate::read::contours::{ContourFacts, rasterise};
 use crate::read::painted::{Painted, listed, painting_order};
-use crate::read::segments::name_of;
+use crate::read::segments::{is_lesion, name_of};
 use crate::read::{ReadOptions, unreadable};
 use crate::{ImagingError, LabelMap, Remark, VoxelGrid};
 
@@ -139,11 +139,14 @@ fn rois(data: &DataSet) -> Result<(Vec<Roi>, Vec<String>), ImagingError> {
             .unwrap_or_default();
         let coded =
             seen.and_then(|seen| seen.items(tag::ROI_CODE).first()?.text(tag::CODE_MEANING));
-        let coded = coded.or_else(|| match kind.as_str() {
-            "EXTERNAL" => Some("External".to_owned()),
-            "GTV" => Some("Tumor".to_owned()),
-            _ => None,
-        });
+        let coded = match kind.as_str() {
+            // Named, and perhaps coded, by where it is: `GTV_Lung_L`.
+            "GTV" => coded
+                .filter(|coded| is_lesion(coded))
+                .or_else(|| Some("Tumor".to_owned())),
+            "EXTERNAL" => coded.or_else(|| Some("External".to_owned())),
+            _ => coded,
+        };
         let label = item.text(tag::ROI_NAME);
         let written = label.clone().unwrap_or_else(|| format!("structure {at}"));
         if OF_A_PLAN.contains(&kind.as_str()) {

@@ -2,8 +2,8 @@
 
 use std::sync::atomic::AtomicBool;
 
-use needlebench_imaging::ImagingError;
 use needlebench_imaging::read::{ReadLabels, ReadOptions, ScanIdentity, read_labels};
+use needlebench_imaging::{ImagingError, SurfaceTissue, structure_of};
 
 use super::made::{Slice, refusal, stack, write};
 
@@ -235,4 +235,17 @@ fn what_cannot_be_voxels_is_refused_by_the_name_of_its_structure() {
     }
     let refused = refusal(labels_of(&[]));
     assert!(refused.contains("no structures"), "{refused}");
+}
+
+#[test]
+fn a_gross_tumour_is_a_lesion_whatever_place_its_name_has() {
+    for name in ["GTV_Lung_L", "GTV liver", "Rib 7"] {
+        let mut structures = one(rectangle([1.0, 1.0], [2.0, 2.0], 2.0));
+        structures[0].name = name;
+        structures[0].kind = "GTV";
+        let read = labels_of(&structures).unwrap();
+        assert_eq!(read.labels.names, [(1, format!("Tumor {name}"))]);
+        let structure = structure_of(&read.labels.names[0].1).unwrap();
+        assert_eq!(structure.tissue, SurfaceTissue::Lesion, "{name}");
+    }
 }
