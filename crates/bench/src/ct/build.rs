@@ -333,18 +333,14 @@ fn labels_of(
         }
         _ => error.at(place.clone()),
     };
-    let read = read_labels(&given.file, grid, options, control.cancel).map_err(within)?;
+    let mut read = read_labels(&given.file, grid, options, control.cancel).map_err(within)?;
+    read.rename(&given.names).map_err(within)?;
     remarks.extend(
         read.remarks
             .into_iter()
             .map(|remark| remark.at("label map")),
     );
-    let mut map = read.labels;
-    for (label, name) in &mut map.names {
-        if let Some((_, given)) = given.names.iter().find(|(known, _)| known == label) {
-            name.clone_from(given);
-        }
-    }
+    let map = read.labels;
     if map
         .names
         .iter()

@@ -18,6 +18,30 @@ pub struct ReadLabels {
     pub labels: LabelMap,
     /// What is odd.
     pub remarks: Vec<Remark>,
+    /// Whether labels are numbers given while reading, of structures that the source names and does not number.
+    pub is_numbered_here: bool,
+}
+
+impl ReadLabels {
+    /// Gives labels the names that a list from elsewhere has for them.
+    ///
+    /// # Errors
+    /// A list for labels that are numbered here: its numbers are of something else.
+    pub fn rename(&mut self, given: &[(u16, String)]) -> Result<(), ImagingError> {
+        if self.is_numbered_here && !given.is_empty() {
+            return Err(ImagingError::refused(
+                "names are given by number, but structures of a folder of masks or of an RT structure set have names \
+                 and no numbers",
+            )
+            .hint("omit --label-names; rename the files of the masks, or the structures, instead"));
+        }
+        for (label, name) in &mut self.labels.names {
+            if let Some((_, given)) = given.iter().find(|(known, _)| known == label) {
+                name.clone_from(given);
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Reads a label map of the CT on `grid` from a DICOM segmentation or RT structure set, any format of volumes, or a
@@ -37,13 +61,14 @@ pub fn read_labels(
     let masks = label_folder::masks(path)?;
     if !masks.is_empty() {
         let (labels, remarks) = label_folder::read(&masks, grid, options, cancel)?;
-        return Ok(ReadLabels { labels, remarks });
+        return Ok(ReadLabels {
+            labels,
+            remarks,
+            is_numbered_here: true,
+        });
     }
     let read = match format_of(path)? {
-        Format::Dicom => {
-            let (labels, remarks) = dicom::read_labels(path, grid, options, cancel)?;
-            ReadLabels { labels, remarks }
-        }
+        Format::Dicom => dicom::read_labels(path, grid, options, cancel)?,
         Format::Stored(open) => of_stored(open(path, options)?, grid, options, cancel)?,
     };
     with_names_of_all(read)
@@ -74,6 +99,7 @@ fn of_stored(
             names,
         },
         remarks,
+        is_numbered_here: false,
     })
 }
 

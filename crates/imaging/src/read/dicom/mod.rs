@@ -26,8 +26,8 @@ use self::file::OpenedFile;
 use self::image::{Slice, named, slices};
 use self::stack::Stack;
 use super::placing::within_reason;
-use super::{Description, ReadOptions, ReadVolume, ScanIdentity, plausibility};
-use crate::{ImagingError, LabelMap, Remark, Volume, VoxelGrid};
+use super::{Description, ReadLabels, ReadOptions, ReadVolume, ScanIdentity, plausibility};
+use crate::{ImagingError, Remark, Volume, VoxelGrid};
 
 pub(super) use file::{FIRST_BYTES, has_mark, is_dicom};
 
@@ -49,11 +49,18 @@ pub(super) fn read_labels(
     grid: &VoxelGrid,
     options: &ReadOptions,
     cancel: &AtomicBool,
-) -> Result<(LabelMap, Vec<Remark>), ImagingError> {
-    match structure_set::open(path, options, cancel)? {
+) -> Result<ReadLabels, ImagingError> {
+    let structures = structure_set::open(path, options, cancel)?;
+    let is_numbered_here = structures.is_some();
+    let (labels, remarks) = match structures {
         Some(opened) => structure_set::read(&opened, grid, options, cancel),
         None => segmentation::read(path, grid, options, cancel),
-    }
+    }?;
+    Ok(ReadLabels {
+        labels,
+        remarks,
+        is_numbered_here,
+    })
 }
 
 /// What was found at a path.

@@ -214,6 +214,7 @@ fn a_folder_of_masks_is_one_label_map() {
         ("statistics.json", b"{}".to_vec()),
     ])
     .unwrap();
+    assert!(read.is_numbered_here);
     // Numbers in the order of the names; the nodule hides the lobe.
     assert_eq!(read.labels.labels[..8], [2, 1, 2, 2, 0, 3, 3, 0]);
     let names = [

@@ -249,3 +249,18 @@ fn a_gross_tumour_is_a_lesion_whatever_place_its_name_has() {
         assert_eq!(structure.tissue, SurfaceTissue::Lesion, "{name}");
     }
 }
+
+#[test]
+fn names_by_number_are_not_of_structures_without_numbers() {
+    let mut read = labels_of(&one(rectangle([1.0, 1.0], [2.0, 2.0], 2.0))).unwrap();
+    let before = read.clone();
+    let refused = refusal(read.rename(&[(1, "liver".to_owned())]));
+    assert!(refused.contains("omit --label-names"), "{refused}");
+    assert_eq!(read, before);
+    read.rename(&[]).unwrap();
+    assert_eq!(read, before);
+    read.is_numbered_here = false;
+    read.rename(&[(1, "liver".to_owned()), (2, "heart".to_owned())])
+        .unwrap();
+    assert_eq!(read.labels.names, [(1, "liver".to_owned())]);
+}
