@@ -68,6 +68,13 @@ pub(super) fn unpacked(
         ))
         .hint("unpack it, and name the folder of one study or series"));
     }
+    if archive.has_duplicate_names() {
+        // Of files with one name the last alone would be seen: slices would be missing.
+        return Err(ImagingError::refused(
+            "several files of the ZIP archive have the same name: unpacked, they would replace each other",
+        )
+        .hint("export it again, each file with a name of its own"));
+    }
     let folder = tempfile::Builder::new()
         .prefix("needlebench-")
         .tempdir()

@@ -142,6 +142,23 @@ fn a_damaged_archive_is_refused_wherever_it_ends() {
 }
 
 #[test]
+fn files_with_the_same_name_are_refused() {
+    let slices = stack(3);
+    let files = ["s/IM0", "s/IM1", "s/IM2"].into_iter();
+    let entries = files.zip(slices.iter().map(super::made::Slice::bytes));
+    let mut bytes = deflated(&entries.collect());
+    read_as("a.zip", &bytes).unwrap();
+    // The last one is called as the one before, in its own header and in the directory.
+    let mut at = 0;
+    while let Some(next) = bytes[at..].windows(5).position(|five| five == b"s/IM2") {
+        bytes[at + next + 4] = b'1';
+        at += next + 5;
+    }
+    let said = refusal(read_as("a.zip", &bytes));
+    assert!(said.contains("have the same name"), "{said}");
+}
+
+#[test]
 fn encryption_and_other_methods_are_refused_by_name() {
     // The bit of encryption, and the method, of the local header and of the directory.
     let with = |offset: usize, value: u8| {
