@@ -86,7 +86,7 @@ pub(super) fn unpacked(
         let Some(name) = name else { continue };
         let shown = name.display().to_string();
         let target = folder.path().join(&name);
-        let unpack = unpack(&mut archive, at, &target, &mut left, cancel);
+        let unpack = unpack(&mut archive, at, &target, &mut left, options, cancel);
         unpack.map_err(|problem| problem.at(shown))?;
         files.push(target);
     }
@@ -150,19 +150,19 @@ fn unpack(
     at: usize,
     target: &Path,
     left: &mut u64,
+    options: &ReadOptions,
     cancel: &AtomicBool,
 ) -> Result<(), ImagingError> {
-    let too_large = |bytes: u64| {
+    let too_large = || {
         ImagingError::refused(format!(
             "the files of the ZIP archive have more than the {} allowed",
-            in_mib(bytes)
+            in_mib(options.max_bytes)
         ))
         .hint("unpack it and name the folder of one series, or raise the limit with --max-memory")
     };
-    let most = *left;
     let mut entry = archive.by_index(at).map_err(damaged)?;
-    if entry.size() > most {
-        return Err(too_large(most));
+    if entry.size() > *left {
+        return Err(too_large());
     }
     if let Some(folder) = target.parent() {
         fs::create_dir_all(folder).map_err(not_written)?;
@@ -181,9 +181,7 @@ fn unpack(
             break;
         }
         // Whatever the archive states of it.
-        *left = left
-            .checked_sub(got as u64)
-            .ok_or_else(|| too_large(most))?;
+        *left = left.checked_sub(got as u64).ok_or_else(too_large)?;
         file.write_all(&piece[..got]).map_err(not_written)?;
     }
     file.flush().map_err(not_written)
@@ -246,7 +244,7 @@ fn content(folder: &Path, files: &[PathBuf]) -> Result<PathBuf, ImagingError> {
                 name(first),
                 name(second)
             ))
-            .hint("unpack it, and name one of them"))
+            .hint("unpack it, and name one of them; the folder, if they are masks of one structure each"))
         }
     }
 }

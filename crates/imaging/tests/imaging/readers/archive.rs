@@ -91,6 +91,8 @@ fn the_only_volume_of_another_format_is_read() {
         said.contains("2 volumes, such as a.nii and b/b.mha"),
         "{said}"
     );
+    // Of masks the folder is to be named.
+    assert!(said.contains("the folder, if they are masks"), "{said}");
 }
 
 #[test]
@@ -213,5 +215,15 @@ fn an_archive_takes_no_more_than_the_limit_whatever_it_states() {
     // Files that together are more.
     let both = deflated(&vec![("a", vec![1; 600_000]), ("b", vec![2; 600_000])]);
     std::fs::write(&path, &both).unwrap();
-    assert!(refusal(read(&path, &options)).contains("more than"));
+    let said = refusal(read(&path, &options));
+    assert!(said.contains("more than the 1 MiB allowed"), "{said}");
+    // The limit is said, and not what the files before have left of it.
+    let options = ReadOptions {
+        max_bytes: 3 << 20,
+        ..ReadOptions::default()
+    };
+    let both = deflated(&vec![("a", vec![1; 2 << 20]), ("b", vec![2; 2 << 20])]);
+    std::fs::write(&path, &both).unwrap();
+    let said = refusal(read(&path, &options));
+    assert!(said.contains("more than the 3 MiB allowed"), "{said}");
 }
