@@ -32,6 +32,16 @@ const OF_A_PLAN: [&str; 10] = [
     "TREATED_VOLUME",
 ];
 
+/// Words of their names, where their type does not say it; numbers may follow.
+const WORDS_OF_A_PLAN: [&str; 7] = ["avoid", "avoidance", "ctv", "itv", "prv", "ptv", "ring"];
+
+/// Whether a name is that of a margin or of a region of a plan: `PTV_60`, `PRV05 cord`, `Lung-PTV`.
+fn is_named_as_of_a_plan(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    let mut words = lower.split(|c: char| !c.is_alphabetic());
+    words.any(|word| WORDS_OF_A_PLAN.contains(&word))
+}
+
 /// A structure.
 #[derive(Debug, Default)]
 struct Roi {
@@ -149,7 +159,7 @@ fn rois(data: &DataSet) -> Result<(Vec<Roi>, Vec<String>), ImagingError> {
         };
         let label = item.text(tag::ROI_NAME);
         let written = label.clone().unwrap_or_else(|| format!("structure {at}"));
-        if OF_A_PLAN.contains(&kind.as_str()) {
+        if OF_A_PLAN.contains(&kind.as_str()) || is_named_as_of_a_plan(&written) {
             of_plan.push(written);
             continue;
         }
@@ -280,4 +290,30 @@ fn of_contours(rois: &[Roi], facts: &[ContourFacts]) -> Vec<Remark> {
         )));
     }
     remarks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn volumes_of_a_plan_are_known_by_words_of_their_names() {
+        for name in [
+            "PTV_60",
+            "ptv2",
+            "CTV Lung_L",
+            "ITV",
+            "PRV05",
+            "SpinalCord_PRV05",
+            "Ring 3 liver",
+            "Lung_L-PTV",
+            "Avoid heart",
+            "avoidance1",
+        ] {
+            assert!(is_named_as_of_a_plan(name), "{name}");
+        }
+        for name in ["Lung_L", "GTV_1", "Heart", "String", "Cricoid", "Tumor"] {
+            assert!(!is_named_as_of_a_plan(name), "{name}");
+        }
+    }
 }

@@ -264,3 +264,21 @@ fn names_by_number_are_not_of_structures_without_numbers() {
         .unwrap();
     assert_eq!(read.labels.names, [(1, "liver".to_owned())]);
 }
+
+#[test]
+fn volumes_of_a_plan_are_ignored_by_name_too() {
+    let mut structures: Vec<Structure<'_>> = ["Rib 7", "PTV Lung_L", "PRV05 Heart"]
+        .into_iter()
+        .flat_map(|name| {
+            one(rectangle([1.0, 1.0], [2.0, 2.0], 2.0)).map(|it| Structure { name, ..it })
+        })
+        .collect();
+    structures[1].kind = "";
+    let read = labels_of(&structures).unwrap();
+    assert_eq!(read.labels.names, [(1, "Rib 7".to_owned())]);
+    let said = said(&read);
+    assert!(
+        said.contains("are ignored: `PTV Lung_L`, `PRV05 Heart`"),
+        "{said}"
+    );
+}
