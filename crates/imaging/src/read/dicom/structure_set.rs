@@ -1,5 +1,6 @@
 //! RT structure sets as label maps: closed planar contours of structures, in patient coordinates.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -41,6 +42,9 @@ fn is_named_as_of_a_plan(name: &str) -> bool {
     let mut words = lower.split(|c: char| !c.is_alphabetic());
     words.any(|word| WORDS_OF_A_PLAN.contains(&word))
 }
+
+/// Most structures of a set.
+const MOST_STRUCTURES: usize = 4096;
 
 /// A structure.
 #[derive(Debug, Default)]
@@ -136,13 +140,40 @@ pub(super) fn read(
     Ok((map, remarks))
 }
 
+/// Structures with their numbers, by which contours and types belong to them: each has one of its own.
+fn numbered(items: &[DataSet]) -> Result<Vec<(i64, &DataSet)>, ImagingError> {
+    let refused = |what: String| {
+        ImagingError::refused(what)
+            .at(tag::written(tag::STRUCTURES))
+            .hint("export it again")
+    };
+    if items.len() > MOST_STRUCTURES {
+        return Err(refused(format!(
+            "it has {} structures, at most {MOST_STRUCTURES} are read",
+            items.len()
+        )));
+    }
+    let mut seen = BTreeMap::new();
+    let mut numbered = Vec::with_capacity(items.len());
+    for (at, item) in (1..).zip(items) {
+        let number = item
+            .integer(tag::ROI_NUMBER)
+            .ok_or_else(|| refused(format!("structure {at} has no ROI Number")))?;
+        if let Some(other) = seen.insert(number, at) {
+            return Err(refused(format!(
+                "structures {other} and {at} have the same ROI Number {number}"
+            )));
+        }
+        numbered.push((number, item));
+    }
+    Ok(numbered)
+}
+
 /// Structures, and the names of those that are of a plan.
 fn rois(data: &DataSet) -> Result<(Vec<Roi>, Vec<String>), ImagingError> {
     let (mut rois, mut of_plan) = (Vec::new(), Vec::new());
-    let number_of = |item: &DataSet, tag| item.integer(tag).unwrap_or(-1);
-    for (at, item) in (1..).zip(data.items(tag::STRUCTURES)) {
-        let number = number_of(item, tag::ROI_NUMBER);
-        let is_it = |item: &&DataSet| number_of(item, tag::REFERENCED_ROI) == number;
+    for (at, (number, item)) in (1..).zip(numbered(data.items(tag::STRUCTURES))?) {
+        let is_it = |item: &&DataSet| item.integer(tag::REFERENCED_ROI) == Some(number);
         let seen = data.items(tag::OBSERVATIONS).iter().find(is_it);
         let kind = seen
             .and_then(|seen| seen.text(tag::ROI_TYPE))

@@ -45,12 +45,18 @@ fn rectangle(from: [f64; 2], to: [f64; 2], height_mm: f64) -> String {
 }
 
 fn structure_set(structures: &[Structure<'_>], frame: &str) -> Vec<u8> {
+    let numbers: Vec<String> = (1..=structures.len()).map(|it| it.to_string()).collect();
+    let numbers: Vec<&str> = numbers.iter().map(String::as_str).collect();
+    structure_set_of(structures, &numbers, frame)
+}
+
+/// With these ROI Numbers.
+fn structure_set_of(structures: &[Structure<'_>], numbers: &[&str], frame: &str) -> Vec<u8> {
     let text = |tag: u32, vr: &[u8; 2], text: &str| (tag, *vr, text.as_bytes().to_vec());
     let (mut rois, mut all, mut seen) = (Vec::new(), Vec::new(), Vec::new());
-    for (number, each) in (1..).zip(structures) {
-        let number = format!("{number}");
+    for (&number, each) in numbers.iter().zip(structures) {
         rois.extend(item(&[
-            text(0x3006_0022, b"IS", &number),
+            text(0x3006_0022, b"IS", number),
             text(0x3006_0024, b"UI", frame),
             text(0x3006_0026, b"LO", each.name),
         ]));
@@ -68,10 +74,10 @@ fn structure_set(structures: &[Structure<'_>], frame: &str) -> Vec<u8> {
             .collect();
         all.extend(item(&[
             (0x3006_0040, *b"SQ", contours),
-            text(0x3006_0084, b"IS", &number),
+            text(0x3006_0084, b"IS", number),
         ]));
         seen.extend(item(&[
-            text(0x3006_0084, b"IS", &number),
+            text(0x3006_0084, b"IS", number),
             text(0x3006_00A4, b"CS", each.kind),
         ]));
     }
@@ -281,4 +287,31 @@ fn volumes_of_a_plan_are_ignored_by_name_too() {
         said.contains("are ignored: `PTV Lung_L`, `PRV05 Heart`"),
         "{said}"
     );
+}
+
+#[test]
+fn structures_are_told_apart_by_numbers_of_their_own() {
+    let ct = super::made::read_slices(&stack(3), &ReadOptions::default()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("RS.dcm");
+    let read = |numbers: &[&str]| {
+        let points = rectangle([1.0, 1.0], [2.0, 2.0], 2.0);
+        let structures: Vec<Structure<'_>> =
+            numbers.iter().flat_map(|_| one(points.clone())).collect();
+        std::fs::write(&path, structure_set_of(&structures, numbers, FRAME)).unwrap();
+        let never = AtomicBool::new(false);
+        read_labels(&path, &ct.volume.grid, &ReadOptions::default(), &never)
+    };
+    read(&["7", "3"]).unwrap();
+    let said = refusal(read(&["7", "3", "7"]));
+    assert!(
+        said.contains("structures 1 and 3 have the same ROI Number 7"),
+        "{said}"
+    );
+    let said = refusal(read(&["7", ""]));
+    assert!(said.contains("structure 2 has no ROI Number"), "{said}");
+    let many: Vec<String> = (0..4097).map(|it: i32| it.to_string()).collect();
+    let many: Vec<&str> = many.iter().map(String::as_str).collect();
+    let said = refusal(read(&many));
+    assert!(said.contains("it has 4097 structures"), "{said}");
 }
