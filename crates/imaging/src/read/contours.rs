@@ -1,6 +1,6 @@
 //! Closed planar contours made into voxels: those whose centres are inside.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point3;
 
@@ -13,6 +13,15 @@ const FLAT_M: f64 = 5e-5;
 /// Distance of contours, in slices, that are of different planes.
 const SAME_PLANE: f64 = 0.02;
 
+/// Distance of planes, in slices, from which contours are on every second slice or on fewer.
+const SPARSE: f64 = 1.5;
+
+/// Most distance of planes of one piece, m: those farther apart are different pieces.
+const MOST_STEP_M: f64 = 0.0101;
+
+/// Rounding of places, in slices.
+const ROUNDING: f64 = 1e-3;
+
 /// What is worth knowing of the contours of one structure.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct ContourFacts {
@@ -20,6 +29,8 @@ pub(super) struct ContourFacts {
     pub(super) off_slice_m: f64,
     /// Contours outside of the volume.
     pub(super) outside: usize,
+    /// Slices without a contour of their own that have the nearest one.
+    pub(super) filled: usize,
     /// Slices without a contour between those that have one.
     pub(super) gaps: usize,
     /// Contours that were there before, point for point.
@@ -34,7 +45,8 @@ struct Contour {
 }
 
 /// Calls `paint` with the offset of each voxel whose centre is inside: within one plane by the even-odd rule, so that
-/// an inner contour is a hole. Planes that are nearest to the same slice are united.
+/// an inner contour is a hole. Planes that are nearest to the same slice are united. Where planes are usually farther
+/// apart than slices, each slice within half of that distance has the nearest one.
 ///
 /// # Errors
 /// Contours that lie across the slices.
@@ -70,8 +82,12 @@ pub(super) fn rasterise(
         planes.push(Contour { points, at });
     }
     planes.sort_by(|a, b| a.at.total_cmp(&b.at));
+    let planes: Vec<&[Contour]> = planes.chunk_by(|a, b| b.at - a.at <= SAME_PLANE).collect();
+    let reach = usual_step(&planes, spacing_m).map_or(0.0, |step| step / 2.0 + ROUNDING);
     let mut slices = BTreeSet::new();
-    for plane in planes.chunk_by(|a, b| b.at - a.at <= SAME_PLANE) {
+    // Slice and distance from it, of those between planes: the nearest counts.
+    let mut between = BTreeMap::new();
+    for (number, plane) in planes.iter().enumerate() {
         let at = plane[0].at;
         let Some(slice) = whole(at.round()).filter(|&slice| slice < grid.size()[across]) else {
             facts.outside += plane.len();
@@ -83,11 +99,41 @@ pub(super) fn rasterise(
             facts.off_slice_m = facts.off_slice_m.max(off_m);
         }
         fill(plane, grid, across, slice, &mut paint);
+        if reach > 0.0 {
+            let first = up_to(at - reach, grid.size()[across]);
+            let end = up_to(at + reach, grid.size()[across]);
+            for slice in first..end {
+                let off = (at - slice as f64).abs();
+                let nearest = between.entry(slice).or_insert((off, number));
+                // Of two that are equally near, the first.
+                if off < nearest.0 - ROUNDING {
+                    *nearest = (off, number);
+                }
+            }
+        }
+    }
+    between.retain(|slice, _| !slices.contains(slice));
+    facts.filled = between.len();
+    for (slice, (_, number)) in between {
+        slices.insert(slice);
+        fill(planes[number], grid, across, slice, &mut paint);
     }
     if let (Some(first), Some(last)) = (slices.first(), slices.last()) {
         facts.gaps = last - first + 1 - slices.len();
     }
     Ok(facts)
+}
+
+/// The usual distance of planes, in slices, where it is more than that of slices: contours were drawn, or kept, on some
+/// slices alone.
+fn usual_step(planes: &[&[Contour]], spacing_m: f64) -> Option<f64> {
+    let mut steps: Vec<f64> = planes
+        .windows(2)
+        .map(|pair| pair[1][0].at - pair[0][0].at)
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    let usual = *steps.get(steps.len().checked_sub(1)? / 2)?;
+    (usual > SPARSE && usual * spacing_m <= MOST_STEP_M).then_some(usual)
 }
 
 fn flat_m(spacing_m: f64) -> f64 {
@@ -273,6 +319,31 @@ mod tests {
         assert_eq!(all, wanted);
         assert!((facts.off_slice_m - 1.2e-3).abs() < 1e-9, "{facts:?}");
         assert_eq!((facts.outside, facts.gaps, facts.repeated), (1, 2, 1));
+    }
+
+    #[test]
+    fn slices_between_sparse_contours_have_the_nearest_one() {
+        // 4 mm apart: every second one, of 8 mm.
+        let (all, facts) = inside(&[
+            contour(&square(0.6, 3.4), 1.0),
+            contour(&square(3.6, 5.4), 3.0),
+        ]);
+        let mut wanted = Vec::new();
+        for slice in 0..3 {
+            wanted.extend(offsets(slice, block(1, 4)));
+        }
+        for slice in 3..5 {
+            wanted.extend(offsets(slice, block(4, 6)));
+        }
+        assert_eq!(all, wanted);
+        assert_eq!((facts.filled, facts.gaps), (3, 0), "{facts:?}");
+        // On every slice but one, or as far apart as different pieces, they are as they are.
+        for heights in [&[0.0, 1.0, 3.0][..], &[0.0, 3.0]] {
+            let contours = heights.iter().map(|&at| contour(&square(0.6, 3.4), at));
+            let (all, facts) = inside(&contours.collect::<Vec<_>>());
+            assert_eq!(all.len(), 9 * heights.len());
+            assert_eq!((facts.filled, facts.gaps), (0, 4 - heights.len()));
+        }
     }
 
     #[test]

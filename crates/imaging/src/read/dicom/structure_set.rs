@@ -300,6 +300,12 @@ fn of_contours(rois: &[Roi], facts: &[ContourFacts]) -> Vec<Remark> {
     say(&|_, facts| facts.outside, &|names| {
         format!("contours outside of the volume are ignored: {names}")
     });
+    say(&|_, facts| facts.filled, &|names| {
+        format!(
+            "contours are farther apart than slices: slices without one, within half of that distance, have the \
+             nearest one: {names}"
+        )
+    });
     say(&|_, facts| facts.gaps, &|names| {
         format!("slices without a contour between others are gaps: {names}")
     });
