@@ -1,5 +1,6 @@
 //! Closed planar contours made into voxels: those whose centres are inside.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point3;
@@ -33,7 +34,7 @@ pub(super) struct ContourFacts {
     pub(super) filled: usize,
     /// Slices without a contour between those that have one.
     pub(super) gaps: usize,
-    /// Contours that were there before, point for point.
+    /// Contours that were there before, wherever they begin and whichever way they run.
     pub(super) repeated: usize,
 }
 
@@ -68,12 +69,7 @@ pub(super) fn rasterise(
     let mut seen = BTreeSet::new();
     let mut planes = Vec::new();
     for points in contours {
-        if !seen.insert(
-            points
-                .iter()
-                .map(|point| point.map(f64::to_bits))
-                .collect::<Vec<_>>(),
-        ) {
+        if !seen.insert(round_trip(&points)) {
             facts.repeated += 1;
             continue;
         }
@@ -122,6 +118,45 @@ pub(super) fn rasterise(
         facts.gaps = last - first + 1 - slices.len();
     }
     Ok(facts)
+}
+
+/// The points of a closed contour, in an order that depends neither on the first one nor on the direction.
+fn round_trip(points: &[[f64; 3]]) -> Vec<[u64; 3]> {
+    // One zero, not two.
+    let bits = |point: &[f64; 3]| point.map(|at| (at + 0.0).to_bits());
+    let mut there: Vec<[u64; 3]> = points.iter().map(bits).collect();
+    there.dedup();
+    while there.len() > 1 && there.first() == there.last() {
+        there.pop();
+    }
+    let mut back = there.clone();
+    back.reverse();
+    for way in [&mut there, &mut back] {
+        let first = least_rotation(way);
+        way.rotate_left(first);
+    }
+    there.min(back)
+}
+
+/// Where the rotation begins that comes first in order; of long ones, too, in time that grows with their length alone.
+fn least_rotation<T: Ord>(items: &[T]) -> usize {
+    let count = items.len();
+    let (mut a, mut b, mut same) = (0, 1, 0);
+    while a < count && b < count && same < count {
+        match items[(a + same) % count].cmp(&items[(b + same) % count]) {
+            Ordering::Equal => {
+                same += 1;
+                continue;
+            }
+            Ordering::Greater => a += same + 1,
+            Ordering::Less => b += same + 1,
+        }
+        if a == b {
+            b += 1;
+        }
+        same = 0;
+    }
+    a.min(b)
 }
 
 /// The usual distance of planes, in slices, where it is more than that of slices: contours were drawn, or kept, on some
@@ -343,6 +378,38 @@ mod tests {
             let (all, facts) = inside(&contours.collect::<Vec<_>>());
             assert_eq!(all.len(), 9 * heights.len());
             assert_eq!((facts.filled, facts.gaps), (0, 4 - heights.len()));
+        }
+    }
+
+    #[test]
+    fn the_same_contour_from_another_start_or_the_other_way_is_a_repeat() {
+        let corners = square(0.6, 3.4);
+        let plain = contour(&corners, 1.0);
+        for turn in 0..4 {
+            let mut again = plain.clone();
+            again.rotate_left(turn);
+            let mut back = again.clone();
+            back.reverse();
+            // With the first point at the end, too.
+            let mut closed = again.clone();
+            closed.push(again[0]);
+            let (all, facts) = inside(&[plain.clone(), again, back, closed]);
+            assert_eq!(all, offsets(1, block(1, 4)));
+            assert_eq!(facts.repeated, 3);
+        }
+        let other = contour(&square(0.7, 2.4), 1.0);
+        assert_eq!(inside(&[plain, other]).1.repeated, 0);
+    }
+
+    #[test]
+    fn the_least_rotation_is_found() {
+        for text in [
+            "a", "ba", "abab", "bbab", "cabcab", "aaaab", "bababa", "zzzz",
+        ] {
+            let letters = text.as_bytes();
+            let rotated = |first: usize| [&letters[first..], &letters[..first]].concat();
+            let wanted = (0..letters.len()).map(rotated).min();
+            assert_eq!(Some(rotated(least_rotation(letters))), wanted, "{text}");
         }
     }
 
