@@ -33,6 +33,7 @@ const BASIC_THRESHOLDS: [i64; 3] = [3, 7, 21];
 const BASIC_RESET: i64 = 64;
 
 const CUT_OFF: &str = "they are truncated";
+const TOO_LONG: &str = "they go on behind the last pixel";
 
 /// What is decoded by.
 #[derive(Debug, Clone, Copy)]
@@ -249,6 +250,37 @@ impl<'a> Bits<'a> {
         self.held -= count;
     }
 
+    /// Refuses a scan that does not end here: fewer bits than a byte, the marker of the end, and what fills up.
+    fn end(mut self) -> Result<(), &'static str> {
+        self.fill();
+        let is_marker = |byte: &u8| *byte >= 0x80;
+        if !self.was_ones || !self.bytes.get(self.at).is_some_and(is_marker) {
+            // All bytes are taken, or there are more than a window has.
+            return Err(if self.at < self.bytes.len() {
+                TOO_LONG
+            } else {
+                CUT_OFF
+            });
+        }
+        // The byte of ones before the marker is in the window, too.
+        let left = self.held.checked_sub(8).ok_or(CUT_OFF)?;
+        // Behind a last byte of ones is one more, lest they look like a marker.
+        let before = self.at.checked_sub(3).map(|at| self.bytes[at]);
+        let most = if before == Some(0xFF) { 7 + 7 } else { 7 };
+        if left > most {
+            return Err(TOO_LONG);
+        }
+        let rest = self.bytes[self.at..].iter();
+        let mut rest = rest.skip_while(|byte| **byte == 0xFF);
+        if rest.next() != Some(&END) {
+            return Err("their end is not where the last pixel is");
+        }
+        if rest.any(|byte| ![0, 0xFF].contains(byte)) {
+            return Err("there is more behind their end");
+        }
+        Ok(())
+    }
+
     /// A number of `count` bits, 32 at most.
     fn number(&mut self, count: u32) -> Result<i64, &'static str> {
         if self.held < count {
@@ -408,6 +440,7 @@ impl<'a> Scan<'a> {
             }
             std::mem::swap(&mut above, &mut row);
         }
+        self.bits.end()?;
         Ok(values)
     }
 
@@ -596,7 +629,7 @@ mod tests {
     #[test]
     fn a_stream_cut_off_or_changed_never_panics() {
         let whole = encoded(NEARLY);
-        for length in 0..whole.len() - 4 {
+        for length in 0..whole.len() {
             assert!(decode(&whole[..length], [16, 12]).is_err(), "{length}");
         }
         let mut refused = 0;
@@ -608,6 +641,34 @@ mod tests {
             }
         }
         assert!(refused > 100, "{refused}");
+    }
+
+    #[test]
+    fn a_stream_ends_with_its_last_pixel() {
+        for whole in [EXAMPLE.to_vec(), encoded(LOSSLESS), encoded(NEARLY)] {
+            let size = if whole == EXAMPLE { [4, 4] } else { [16, 12] };
+            let (scan, end) = whole.split_at(whole.len() - 2);
+            let with = |parts: &[&[u8]]| decode(&parts.concat(), size);
+            // Bytes that fill up to an even length, and before a marker.
+            let good: [&[&[u8]]; 3] = [&[end, &[0]], &[&[0xFF], end], &[end, &[0xFF, 0]]];
+            for end in good {
+                with(&[&[scan][..], end].concat()).unwrap();
+            }
+            let mut other = end.to_vec();
+            other[1] = 0xDA;
+            let bad: [&[&[u8]]; 7] = [
+                &[&[0], end],
+                &[&[0; 40], end],
+                &[&[0x55; 3], end],
+                &[&other],
+                &[end, &[1]],
+                &[&end[..1]],
+                &[],
+            ];
+            for end in bad {
+                with(&[&[scan][..], end].concat()).unwrap_err();
+            }
+        }
     }
 
     #[test]
