@@ -17,21 +17,51 @@ const MOST_FILES: usize = 4096;
 
 /// A file, and the name of its structure.
 #[derive(Debug)]
-pub(super) struct MaskFile {
+struct MaskFile {
     path: PathBuf,
     name: String,
 }
 
-/// The masks of a folder, in the order of their names; none if it is no folder, or has no volume in it.
-pub(super) fn masks(path: &Path) -> Result<Vec<MaskFile>, ImagingError> {
-    let mut masks = Vec::new();
+/// A folder, with its masks in the order of their names.
+#[derive(Debug, Default)]
+pub(super) struct MaskFolder {
+    masks: Vec<MaskFile>,
+    /// Other files.
+    others: Vec<PathBuf>,
+}
+
+impl MaskFolder {
+    pub(super) fn is_empty(&self) -> bool {
+        self.masks.is_empty()
+    }
+
+    /// That there is DICOM, too: a segmentation of which nothing is read.
+    fn dicom(&self) -> Option<Remark> {
+        let is_dicom = |path: &&PathBuf| matches!(format_of(path), Ok(Format::Dicom));
+        let mut dicom = self.others.iter().filter(is_dicom);
+        let first = dicom.next()?.file_name()?.to_string_lossy().into_owned();
+        Some(Remark::new(format!(
+            "DICOM files beside the masks are ignored ({}, such as `{first}`): a segmentation among them is read by \
+             its own name",
+            1 + dicom.count()
+        )))
+    }
+}
+
+/// The masks of a folder; none if it is no folder, or has no volume in it.
+pub(super) fn masks(path: &Path) -> Result<MaskFolder, ImagingError> {
+    let (mut masks, mut others) = (Vec::new(), Vec::new());
     if !path.is_dir() {
-        return Ok(masks);
+        return Ok(MaskFolder::default());
     }
     for entry in path.read_dir().map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        if let Some(name) = structure_name(&path).filter(|_| path.is_file()) {
-            masks.push(MaskFile { path, name });
+        if !path.is_file() {
+            continue;
+        }
+        match structure_name(&path) {
+            Some(name) => masks.push(MaskFile { path, name }),
+            None => others.push(path),
         }
     }
     if masks.len() > MOST_FILES {
@@ -42,7 +72,8 @@ pub(super) fn masks(path: &Path) -> Result<Vec<MaskFile>, ImagingError> {
         .hint("name the folder of one segmentation"));
     }
     masks.sort_by(|a, b| a.path.cmp(&b.path));
-    Ok(masks)
+    others.sort();
+    Ok(MaskFolder { masks, others })
 }
 
 /// The name of a file without what its format adds.
@@ -59,11 +90,12 @@ fn structure_name(path: &Path) -> Option<String> {
 
 /// Reads the masks one after another; the label of each is its number, from 1.
 pub(super) fn read(
-    masks: &[MaskFile],
+    folder: &MaskFolder,
     grid: &VoxelGrid,
     options: &ReadOptions,
     cancel: &AtomicBool,
 ) -> Result<(LabelMap, Vec<Remark>), ImagingError> {
+    let masks = &folder.masks;
     let names: Vec<String> = masks.iter().map(|mask| mask.name.clone()).collect();
     let mut painted = Painted::new(grid, masks.len(), options)?;
     let mut remarks = Vec::new();
@@ -86,6 +118,7 @@ pub(super) fn read(
     );
     let (map, of_map) = painted.finish(grid, names)?;
     remarks.extend(of_map);
+    remarks.extend(folder.dicom());
     Ok((map, remarks))
 }
 

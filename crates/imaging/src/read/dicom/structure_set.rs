@@ -8,7 +8,7 @@ use nalgebra::Point3;
 
 use super::dataset::DataSet;
 use super::file::OpenedFile;
-use super::{DEPTH, collect, tag};
+use super::{DEPTH, collect, name_in, tag};
 use crate::read::contours::{ContourFacts, rasterise};
 use crate::read::painted::{Painted, listed, painting_order};
 use crate::read::segments::{is_lesion, name_of};
@@ -73,6 +73,7 @@ pub(super) fn open(
         files.push(path.to_owned());
     }
     let mut found = None;
+    let (mut structures, mut segmentations) = (Vec::new(), Vec::new());
     for file in files {
         if cancel.load(Ordering::Relaxed) {
             return Err(ImagingError::Interrupted);
@@ -82,9 +83,14 @@ pub(super) fn open(
             continue;
         };
         let says = |tag, kind: &str| opened.data.text(tag).as_deref() == Some(kind);
+        let name = name_in(path, &file);
         if !says(tag::MODALITY, MODALITY) && !says(tag::SOP_CLASS, SOP_CLASS) {
+            if opened.data.text(tag::SEGMENTATION_TYPE).is_some() {
+                segmentations.push(name);
+            }
             continue;
         }
+        structures.push(name);
         if found.replace(opened).is_some() {
             return Err(
                 ImagingError::refused("the folder has several RT structure sets")
@@ -98,6 +104,12 @@ pub(super) fn open(
                     .hint("raise the limit with --max-memory"),
             );
         }
+    }
+    if let ([first, ..], [other, ..]) = (&*structures, &*segmentations) {
+        return Err(ImagingError::refused(format!(
+            "the folder has an RT structure set and a segmentation: {first} and {other}"
+        ))
+        .hint("name one of them by its file"));
     }
     Ok(found)
 }

@@ -296,3 +296,27 @@ fn names_in_the_header_of_nifti_are_those_of_the_labels() {
     assert!(read.remarks[0].message.contains("is cut off"));
     assert!(!format!("{:?}", read.remarks).contains("Zyxwvut"));
 }
+
+#[test]
+fn kinds_of_segmentations_in_one_folder_are_named() {
+    let structures = super::structure_set::made();
+    let bits = || segmentation("BINARY", &["-10\\20\\4", "-10\\20\\0"]);
+    let read = folder(&[
+        ("aorta.nii", mask(&[0])),
+        ("RS.dcm", structures.clone()),
+        ("seg.dcm", bits()),
+        ("notes.txt", b"?".to_vec()),
+    ])
+    .unwrap();
+    let said: Vec<&str> = read.remarks.iter().map(|it| &*it.message).collect();
+    assert!(
+        said.iter().any(|said| said
+            .starts_with("DICOM files beside the masks are ignored (2, such as `RS.dcm`)")),
+        "{said:?}"
+    );
+    let said = refusal(folder(&[("RS.dcm", structures), ("seg.dcm", bits())]));
+    assert!(
+        said.contains("an RT structure set and a segmentation: RS.dcm and seg.dcm"),
+        "{said}"
+    );
+}
