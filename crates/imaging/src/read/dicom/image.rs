@@ -181,6 +181,17 @@ fn percentage(text: &str) -> Option<String> {
         .then(|| percent.to_string())
 }
 
+/// Parts of words by which a description says that its percentage is one of a cycle.
+const GATING: [&str; 10] = [
+    "gated", "gating", "phase", "resp", "breath", "insp", "expi", "cardiac", "ecg", "t=",
+];
+
+/// Whether a description is of a phase of breathing or of the heart.
+fn is_gated(text: &str) -> bool {
+    let lower = text.to_lowercase();
+    GATING.iter().any(|part| lower.contains(part))
+}
+
 /// One slice.
 #[derive(Debug, Clone)]
 pub(super) struct Slice {
@@ -197,6 +208,8 @@ pub(super) struct Slice {
     pub(super) thickness_mm: Option<f64>,
     pub(super) tube_voltage_kv: Option<f64>,
     pub(super) patient_position: Option<PatientPosition>,
+    /// Whether the description with a percentage says that it is of a phase.
+    pub(super) is_gated: bool,
     /// What may tell phases of one series, by [`WAYS`].
     pub(super) phase: [Option<String>; WAYS],
     pub(super) is_cone_beam: bool,
@@ -322,6 +335,10 @@ fn slice_of(file: &Arc<ImageFile>, frame: usize, layers: &Layers) -> Slice {
         let percent = layers.real(tag).ok().flatten();
         percent.map(|percent| percent.to_string())
     };
+    let described = [tag::SERIES_DESCRIPTION, tag::IMAGE_COMMENTS]
+        .into_iter()
+        .filter_map(|tag| layers.text(tag))
+        .find(|text| percentage(text).is_some());
     Slice {
         file: Arc::clone(file),
         frame,
@@ -348,6 +365,7 @@ fn slice_of(file: &Arc<ImageFile>, frame: usize, layers: &Layers) -> Slice {
             .text(tag::PATIENT_POSITION)
             .and_then(|term| PatientPosition::of_term(&term)),
         is_cone_beam,
+        is_gated: described.as_deref().is_some_and(is_gated),
         phase: [
             integer(tag::ACQUISITION_NUMBER).map(|number| number.to_string()),
             layers.text(tag::TEMPORAL_POSITION),
@@ -355,9 +373,7 @@ fn slice_of(file: &Arc<ImageFile>, frame: usize, layers: &Layers) -> Slice {
             layers.text(tag::TRIGGER_TIME),
             percent(tag::NOMINAL_CARDIAC_PERCENTAGE),
             percent(tag::NOMINAL_RESPIRATORY_PERCENTAGE),
-            [tag::SERIES_DESCRIPTION, tag::IMAGE_COMMENTS]
-                .into_iter()
-                .find_map(|tag| percentage(&layers.text(tag)?)),
+            described.as_deref().and_then(percentage),
             layers.text(tag::ACQUISITION_DATE_TIME),
             layers.text(tag::ACQUISITION_TIME),
             layers.text(tag::CONTENT_TIME),

@@ -141,7 +141,12 @@ fn phases(slices: Vec<Slice>) -> Vec<Series> {
         let are_whole = parts
             .values()
             .all(|part| part.len() > 1 && duplicates(part).is_empty());
-        if parts.len() < 2 || !are_whole || way >= TIMES && !are_at_the_same_places(&parts) {
+        if parts.len() < 2 || !are_whole {
+            continue;
+        }
+        // Parts that overlap alone, such as of two acquisitions, are no phases.
+        let is_phase = is_doubled && are_at_the_same_places(&parts);
+        if way >= TIMES && !are_at_the_same_places(&parts) {
             continue;
         }
         let mut parts: Vec<_> = parts.into_iter().collect();
@@ -162,7 +167,7 @@ fn phases(slices: Vec<Slice>) -> Vec<Series> {
                     number: at + 1,
                     of,
                     told_by: told_by(way, slices[0].phase[way].as_deref()),
-                    is_phase: is_doubled,
+                    is_phase,
                 };
                 series(slices, copies, Some(part))
             };
@@ -256,8 +261,23 @@ impl Series {
         self.key().modality.as_deref() == Some("XA") && self.slices[0].plane.is_err()
     }
 
+    /// The percentage in its description, where it is that of a phase: beside a word of gating, or another one in that
+    /// of a series of as many slices.
+    fn percentage_of_phase(&self, all: &[Self]) -> Option<&str> {
+        let percentage = |series: &Self| series.slices[0].phase[PERCENTAGE].clone();
+        let own = percentage(self)?;
+        let differs = |other: &Self| {
+            other.slices.len() == self.slices.len()
+                && percentage(other).is_some_and(|other| other != own)
+        };
+        let is_phase = self.slices[0].is_gated || all.iter().any(differs);
+        self.slices[0].phase[PERCENTAGE]
+            .as_deref()
+            .filter(|_| is_phase)
+    }
+
     /// For the list of what a folder holds: no more than what tells series apart.
-    fn in_words(&self) -> String {
+    fn in_words(&self, all: &[Self]) -> String {
         let key = self.key();
         let count = self.slices.len();
         let mut words = vec![format!(
@@ -289,7 +309,7 @@ impl Series {
             } = part;
             let kind = if *is_phase { "phase" } else { "part" };
             words.push(format!("{kind} {number} of {of} ({told_by})"));
-        } else if let Some(percent) = &self.slices[0].phase[PERCENTAGE] {
+        } else if let Some(percent) = self.percentage_of_phase(all) {
             words.push(format!("phase {percent} %"));
         }
         if let Some(made) = key.made {
@@ -374,7 +394,11 @@ fn view(plane: &Plane) -> Option<String> {
 
 /// All series in a list.
 fn list(all: &[Series]) -> String {
-    let mut lines: Vec<String> = all.iter().take(LISTED).map(Series::in_words).collect();
+    let mut lines: Vec<String> = all
+        .iter()
+        .take(LISTED)
+        .map(|series| series.in_words(all))
+        .collect();
     if all.len() > LISTED {
         lines.push(format!("and {} more", all.len() - LISTED));
     }

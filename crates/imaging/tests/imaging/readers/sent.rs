@@ -122,6 +122,42 @@ fn phases_that_are_series_of_their_own_have_their_percentage() {
 }
 
 #[test]
+fn a_percentage_of_something_else_is_no_phase() {
+    let said_of = |description: &str| {
+        let mut slices = changed(stack(3), DESCRIPTION, *b"LO", description);
+        slices.extend(of_series(5, stack(3)));
+        refusal(read_slices(&slices, &default()))
+    };
+    let said = said_of("Zyxwvut ASiR 40%");
+    assert!(
+        said.contains("2 series") && !said.contains("phase"),
+        "{said}"
+    );
+    let said = said_of("Zyxwvut gated 40%");
+    assert!(said.contains("phase 40 %"), "{said}");
+}
+
+#[test]
+fn parts_at_other_places_are_not_called_phases() {
+    let acquired = |number: &str, heights_mm: [f64; 3]| {
+        let slices = heights_mm.map(|mm| {
+            let slice = Slice::at(mm);
+            let instance = format!("{}.{number}", slice.instance);
+            Slice { instance, ..slice }.with(0x0020_0012, *b"IS", number)
+        });
+        Vec::from(slices)
+    };
+    let mut slices = acquired("1", [0.0, 2.0, 4.0]);
+    slices.extend(acquired("2", [4.0, 6.0, 8.0]));
+    let said = refusal(read_slices(&slices, &default()));
+    assert!(
+        said.contains("2 series are possible") && said.contains("part 1 of 2 (acquisition 1)"),
+        "{said}"
+    );
+    assert!(!said.contains("phase"), "{said}");
+}
+
+#[test]
 fn bolus_tracking_is_no_volume() {
     let tracking = |at: u32| Slice {
         instance: format!("1.7.{at}"),
