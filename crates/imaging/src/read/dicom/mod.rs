@@ -153,18 +153,21 @@ fn without_images(path: &Path, files: usize, empty: usize) -> ImagingError {
         .hint("name a folder with the DICOM files of a scan, or a .nii or .nii.gz file")
 }
 
-/// Refuses files without a byte that are called as the slices are; else remarks on them.
+/// Refuses files without a byte that are called as the slices in the same folder are; else remarks on them.
 fn check_empty(empty: &[String], slices: &[Slice]) -> Result<Option<Remark>, ImagingError> {
     let Some(first) = empty.first() else {
         return Ok(None);
     };
-    let named: BTreeSet<String> = slices
+    let in_folder = |name: &str| {
+        let path = Path::new(name);
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        (path.parent().map(Path::to_owned), without_digits(&file))
+    };
+    let named: BTreeSet<_> = slices
         .iter()
-        .map(|slice| without_digits(&slice.file.name))
+        .map(|slice| in_folder(&slice.file.name))
         .collect();
-    let mut like_slices = empty
-        .iter()
-        .filter(|name| named.contains(&without_digits(name)));
+    let mut like_slices = empty.iter().filter(|name| named.contains(&in_folder(name)));
     if let Some(first) = like_slices.next() {
         return Err(ImagingError::refused(format!(
             "{} of the files are empty (0 bytes) and named like the slices: slices are missing",

@@ -235,13 +235,37 @@ fn slices_without_a_byte_are_called_that() {
         "{}",
         remarks(&found)
     );
-    std::fs::write(folder.path().join("IM9999"), b"").unwrap();
+    // Of another series, in a folder of its own.
+    std::fs::remove_file(folder.path().join("VERSION")).unwrap();
+    for (series, slices) in [("S1", stack(4)), ("S2", Vec::new())] {
+        let inner = folder.path().join(series);
+        std::fs::create_dir(&inner).unwrap();
+        for (at, slice) in slices.iter().enumerate() {
+            std::fs::write(inner.join(format!("IM{at}")), slice.bytes()).unwrap();
+        }
+        std::fs::write(inner.join("README"), b"").unwrap();
+    }
+    for file in folder.path().read_dir().unwrap() {
+        let file = file.unwrap().path();
+        if file.is_file() {
+            std::fs::remove_file(file).unwrap();
+        }
+    }
+    std::fs::write(folder.path().join("S2").join("IM0"), b"").unwrap();
+    let found = read(&path, &default()).unwrap();
+    assert!(
+        remarks(&found).contains("3 files are empty (0 bytes): ignored"),
+        "{}",
+        remarks(&found)
+    );
+    std::fs::remove_dir_all(folder.path().join("S2")).unwrap();
+    std::fs::write(folder.path().join("S1").join("IM9999"), b"").unwrap();
     let said = refusal(read(&path, &default()));
     assert!(
         said.contains("IM9999") && said.contains("0 bytes") && said.contains("slices are missing"),
         "{said}"
     );
-    for file in folder.path().read_dir().unwrap() {
+    for file in folder.path().join("S1").read_dir().unwrap() {
         std::fs::write(file.unwrap().path(), b"").unwrap();
     }
     let said = refusal(read(&path, &default()));
