@@ -383,8 +383,8 @@ def jpeg_ls(reader: Reader, folder: Path) -> None:
 
 
 def damaged_streams(reader: Reader, folder: Path, *kinds: list[FileDataset]) -> None:
-    """Streams cut, and of another width, are refused; changed ones are too, or read as they say: what their numbers are is
-    not compared, only that a refusal says `damaged` and no decoder panics."""
+    """Streams cut, and of another width, are refused. Changed ones are refused as damaged or read, whatever their
+    numbers then are, and no decoder panics."""
     for slices in kinds:
         whole = slices[0].PixelData
         good = pydicom.dcmread(saved(folder / "stream", slices[:1]) / "s000").pixel_array
