@@ -5,44 +5,12 @@ use std::sync::atomic::AtomicBool;
 
 use super::archive::{self, Unpacked};
 use super::format::{Format, format_of};
+use super::labelled::ReadLabels;
 use super::order::Order;
 use super::painted::{not_found, nothing_found};
 use super::voxels::StoredVoxels;
 use super::{ReadOptions, dicom, label_folder};
-use crate::{ImagingError, LabelMap, Remark, VoxelGrid};
-
-/// A label map on the CT's grid, and what is odd about it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReadLabels {
-    /// Labels of the CT's voxels, with the names of those that have any.
-    pub labels: LabelMap,
-    /// What is odd.
-    pub remarks: Vec<Remark>,
-    /// Whether labels are numbers given while reading, of structures that the source names and does not number.
-    pub is_numbered_here: bool,
-}
-
-impl ReadLabels {
-    /// Gives labels the names that a list from elsewhere has for them.
-    ///
-    /// # Errors
-    /// A list for labels that are numbered here: its numbers are of something else.
-    pub fn rename(&mut self, given: &[(u16, String)]) -> Result<(), ImagingError> {
-        if self.is_numbered_here && !given.is_empty() {
-            return Err(ImagingError::refused(
-                "names are given by number, but structures of a folder of masks or of an RT structure set have names \
-                 and no numbers",
-            )
-            .hint("omit --label-names; rename the files of the masks, or the structures, instead"));
-        }
-        for (label, name) in &mut self.labels.names {
-            if let Some((_, given)) = given.iter().find(|(known, _)| known == label) {
-                name.clone_from(given);
-            }
-        }
-        Ok(())
-    }
-}
+use crate::{ImagingError, LabelMap, VoxelGrid};
 
 /// Reads a label map of the CT on `grid` from a DICOM segmentation or RT structure set, any format of volumes, or a
 /// folder with a mask of one structure in each file.

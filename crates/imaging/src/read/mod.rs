@@ -13,6 +13,7 @@ mod foreign;
 mod format;
 mod label_folder;
 mod label_names;
+mod labelled;
 mod labels;
 mod metaimage;
 mod mgh;
@@ -40,7 +41,8 @@ use self::voxels::StoredVoxels;
 use crate::{ImagingError, Orientation, Remark, Volume, VoxelGrid};
 
 pub use label_names::read_label_names;
-pub use labels::{ReadLabels, read_labels};
+pub use labelled::ReadLabels;
+pub use labels::read_labels;
 pub use patient_position::{Lying, PatientPosition};
 
 /// How to read.

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 use needlebench_imaging::{Label, Reconstruction, Side, SurfaceTissue, Volume, VoxelGrid};
 
-use super::reconstruct::{MM, Solid, chest, grid, options, render, run};
+use super::reconstruct::{Inside, MM, Solid, chest, grid, options, render, run};
 
 fn ball(at: [f64; 3], radius: f64, hu: f64) -> Solid {
     Solid(
@@ -79,9 +79,8 @@ fn blood_with_contrast_medium_that_touches_the_spine_is_no_bone() {
 fn dense_marrow_in_its_shell_is_bone() {
     // Between heart and spine, where pools are looked for.
     const MIDDLE_MM: f64 = 20.0;
-    let within = |radius: f64| -> Box<dyn Fn(&nalgebra::Vector3<f64>) -> bool> {
-        Box::new(move |p| libm::hypot(p.x, p.y - MIDDLE_MM) <= radius)
-    };
+    let within =
+        |radius: f64| -> Inside { Box::new(move |p| libm::hypot(p.x, p.y - MIDDLE_MM) <= radius) };
     for hu in [220.0, 300.0, 400.0] {
         for has_shell in [true, false] {
             let mut solids = chest();

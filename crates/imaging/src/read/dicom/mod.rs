@@ -25,8 +25,9 @@ use self::directory::Directory;
 use self::file::OpenedFile;
 use self::image::{Slice, named, slices};
 use self::stack::Stack;
+use super::labelled::ReadLabels;
 use super::placing::within_reason;
-use super::{Description, ReadLabels, ReadOptions, ReadVolume, ScanIdentity, plausibility};
+use super::{Description, ReadOptions, ReadVolume, ScanIdentity, plausibility};
 use crate::{ImagingError, Remark, Volume, VoxelGrid};
 
 pub(super) use file::{FIRST_BYTES, has_mark, is_dicom};
