@@ -145,6 +145,25 @@ pub(crate) fn is_solid(
     is_solid
 }
 
+/// Fills an outside of a label map: where other structures have the voxels within it, it is hollow.
+///
+/// What it encloses in its slices is in it, also where the first or the last one cuts a lung open.
+pub(crate) fn fill_outside(each: &mut Given) {
+    if each.structure.tissue != SurfaceTissue::Skin {
+        return;
+    }
+    let around = Components::of(&each.mask.complement(), Connectivity::Faces);
+    let [nx, ny, _] = each.mask.size();
+    let within = around.mask_of(|part| {
+        let bounds = &around.parts()[part].bounds;
+        bounds.first[0] > 0
+            && bounds.first[1] > 0
+            && bounds.last[0] < nx - 1
+            && bounds.last[1] < ny - 1
+    });
+    each.mask.unite(&within);
+}
+
 /// Bone nearer to a bone of the label map than this is the same bone, drawn otherwise, m.
 const SAME_BONE_M: f64 = 2e-3;
 

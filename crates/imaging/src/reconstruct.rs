@@ -12,7 +12,9 @@ use serde::Serialize;
 use crate::error::{ImagingError, Remark};
 use crate::field_of_view::FieldOfView;
 use crate::grid::VoxelGrid;
-use crate::label_map::{Given, complete, completed_labels, given_structures, is_solid};
+use crate::label_map::{
+    Given, complete, completed_labels, fill_outside, given_structures, is_solid,
+};
 use crate::mapped_lesions::mapped_lesions;
 use crate::mask::{IndexBox, Mask};
 use crate::segment::{
@@ -209,6 +211,7 @@ pub fn reconstruct(
         None => Vec::new(),
     };
     given.retain(|each| is_solid(each, &found, &volume.grid, &mut remarks));
+    given.iter_mut().for_each(fill_outside);
     let other_bone = complete(&mut found, &given, &volume.grid, &mut remarks)?;
     let is_given = |name: &str| given.iter().any(|each| each.structure.name == name);
     found.note_absent(volume, &is_given, &mut remarks);

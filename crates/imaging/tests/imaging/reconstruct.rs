@@ -835,6 +835,33 @@ fn an_outside_holds_what_is_in_it_and_a_hull_is_no_body() {
 }
 
 #[test]
+fn an_outside_beside_labels_of_what_is_in_it_is_not_hollow() {
+    // Lungs have voxels of their own, and no label at all in the upper half.
+    let names = [(1, "body"), (2, "lung_left"), (3, "lung_right")];
+    let [clear, made] = with_map(&names, |[i, _, k], hu| match hu {
+        i16::MIN..=-950 => 0,
+        -949..=-600 if k >= SIZE[2] / 2 => 0,
+        -949..=-600 if i >= SIZE[0] / 2 => 2,
+        -949..=-600 => 3,
+        _ => 1,
+    });
+    let skin_m3 = |made: &Reconstruction| {
+        let skin = made.surfaces.iter().find(|each| each.name == "skin");
+        skin.map(|skin| (skin.volume_m3, check_closed(&skin.mesh).unwrap().components))
+    };
+    let (Some((before_m3, _)), Some((after_m3, components))) = (skin_m3(&clear), skin_m3(&made))
+    else {
+        panic!("both have a skin");
+    };
+    // The bed is at its back in the map.
+    assert!(
+        (after_m3 / before_m3 - 1.0).abs() < 0.06,
+        "{after_m3} {before_m3}"
+    );
+    assert_eq!(components, 1);
+}
+
+#[test]
 fn one_lobe_is_not_the_lung() {
     let half = SIZE[2] / 2;
     let [clear, made] = with_map(&[(10, "lung_upper_lobe_left")], |[i, _, k], hu| {
