@@ -1,10 +1,9 @@
 //! Arms, couch and rail beside a chest.
 
-use nalgebra::Point3;
 use needlebench_geometry::mesh::check_closed;
 use needlebench_imaging::{Label, Reconstruction, SurfaceTissue};
 
-use super::reconstruct::{MM, Solid, chest, grid, options, render, run};
+use super::reconstruct::{Solid, chest, grid, label_at, options, render, run};
 
 /// Middle of each arm beside the chest, and radii of it and its bone, mm.
 const ARM_MM: [f64; 2] = [165.0, 40.0];
@@ -53,18 +52,6 @@ fn in_the_scanner() -> Vec<Solid> {
     }
     solids.extend(alone());
     solids
-}
-
-fn label_at(made: &Reconstruction, at_mm: [f64; 3]) -> u16 {
-    let grid = &made.labels.grid;
-    let index = grid.index_from_ct(&(Point3::from(at_mm) * MM));
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "places in the volume"
-    )]
-    let voxel = [index.x, index.y, index.z].map(|at| at.round() as usize);
-    made.labels.labels[grid.offset(voxel)]
 }
 
 fn ml(made: &Reconstruction, label: Label) -> f64 {

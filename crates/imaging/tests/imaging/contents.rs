@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 use needlebench_imaging::{Label, Reconstruction, Side, SurfaceTissue, Volume, VoxelGrid};
 
-use super::reconstruct::{Inside, MM, Solid, chest, grid, options, render, run};
+use super::reconstruct::{Inside, Solid, chest, grid, label_at, options, render, run};
 
 fn ball(at: [f64; 3], radius: f64, hu: f64) -> Solid {
     Solid(
@@ -16,18 +16,6 @@ fn ml(made: &Reconstruction, label: Label) -> f64 {
     let voxel_ml = 1e6 * made.labels.grid.steps_m().determinant().abs();
     let count = made.labels.labels.iter().filter(|&&at| at == label as u16);
     count.count() as f64 * voxel_ml
-}
-
-fn label_at(made: &Reconstruction, at_mm: [f64; 3]) -> u16 {
-    let grid = &made.labels.grid;
-    let index = grid.index_from_ct(&(Point3::from(at_mm) * MM));
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a voxel of the grid"
-    )]
-    let voxel = [index.x, index.y, index.z].map(|at| at.round() as usize);
-    made.labels.labels[grid.offset(voxel)]
 }
 
 fn said(made: &Reconstruction, words: &str) -> bool {

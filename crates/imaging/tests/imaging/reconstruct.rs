@@ -132,6 +132,19 @@ pub(super) fn run(
     reconstruct(volume, options, 2, &AtomicBool::new(false), &|_, _| {})
 }
 
+/// The label of the voxel at a place.
+pub(super) fn label_at(made: &Reconstruction, at_mm: [f64; 3]) -> u16 {
+    let grid = &made.labels.grid;
+    let index = grid.index_from_ct(&(Point3::from(at_mm) * MM));
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "places in the volume"
+    )]
+    let voxel = [index.x, index.y, index.z].map(|at| at.round() as usize);
+    made.labels.labels[grid.offset(voxel)]
+}
+
 fn remarks(made: &Reconstruction) -> String {
     let messages = made.remarks.iter().map(|remark| remark.message.as_str());
     messages.collect::<Vec<_>>().join("\n")
@@ -196,15 +209,7 @@ fn chest_is_taken_apart_into_closed_surfaces_of_the_right_size() {
         "{}",
         remarks(&made)
     );
-    let label_at = |at_mm: [f64; 3]| {
-        let index = volume.grid.index_from_ct(&(Point3::from(at_mm) * MM));
-        let voxel = [0, 1, 2].map(|axis| {
-            (0..SIZE[axis])
-                .find(|&i| (i as f64 - index[axis]).abs() <= 0.5)
-                .unwrap()
-        });
-        made.labels.labels[volume.grid.offset(voxel)]
-    };
+    let label_at = |at_mm| label_at(&made, at_mm);
     assert_eq!(label_at([140.0, 102.0, 0.0]), Label::Couch as u16);
     assert_eq!(label_at([72.0, 0.0, 0.0]), Label::LungLeft as u16);
     assert_eq!(label_at([-72.0, -20.0, 0.0]), Label::LungRight as u16);

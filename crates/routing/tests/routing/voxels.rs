@@ -113,23 +113,37 @@ fn rules() -> RouteRules {
     }
 }
 
+/// Options about a target without a lesion, with what is modelled beside bone.
+fn usual() -> VoxelOptions<'static> {
+    VoxelOptions {
+        patient: None,
+        lesions: &[],
+        off: &[],
+        needle_m: 0.15,
+        markers: &[],
+        outside_m: 0.05,
+        lung_vessel_m: 0.0,
+        below_rib_m: 3e-3,
+        beside_sternum_m: 20e-3,
+        threads: 1,
+        cancel: &GO,
+    }
+}
+
 fn anatomy(labels: &LabelMap, threads: usize) -> VoxelAnatomy {
     VoxelAnatomy::new(
         labels,
         Vector3::zeros(),
         Point3::from(TARGET),
         &VoxelOptions {
-            patient: None,
             lesions: &["nodule".to_owned()],
-            off: &[],
             needle_m: rules().longest_m,
-            markers: &[],
             outside_m: rules().outside_m,
             lung_vessel_m: 3e-3,
             below_rib_m: 0.0,
             beside_sternum_m: 0.0,
             threads,
-            cancel: &GO,
+            ..usual()
         },
     )
     .unwrap()
@@ -334,17 +348,14 @@ fn nothing_goes_through_a_marker_on_the_skin() {
     let middle = Point3::from(TARGET) + direction.into_inner() * (skin_m + 3e-3);
     let with = |markers: &[(Point3<f64>, f64)]| {
         let options = VoxelOptions {
-            patient: None,
             lesions: &["nodule".to_owned()],
-            off: &[],
             needle_m: rules().longest_m,
             markers,
             outside_m: rules().outside_m,
             lung_vessel_m: 3e-3,
             below_rib_m: 0.0,
             beside_sternum_m: 0.0,
-            threads: 1,
-            cancel: &GO,
+            ..usual()
         };
         let anatomy = VoxelAnatomy::new(&labels, Vector3::zeros(), Point3::from(TARGET), &options);
         search(&anatomy.unwrap(), &rules(), 4000, 1, &|| false)
@@ -408,19 +419,7 @@ fn what_lies_between_the_lungs_is_an_organ_but_not_the_muscles_of_the_back() {
         (BONE, "bone"),
     ];
     let at = |labels: &LabelMap, target: [f64; 3], off: &[String]| {
-        let options = VoxelOptions {
-            patient: None,
-            lesions: &[],
-            off,
-            needle_m: 0.15,
-            markers: &[],
-            outside_m: 0.05,
-            lung_vessel_m: 0.0,
-            below_rib_m: 3e-3,
-            beside_sternum_m: 20e-3,
-            threads: 1,
-            cancel: &GO,
-        };
+        let options = VoxelOptions { off, ..usual() };
         VoxelAnatomy::new(labels, Vector3::zeros(), Point3::from(target), &options).unwrap()
     };
     // Along x through the middle slice at some row, from the left lung's first columns to the right one's last.
@@ -480,17 +479,8 @@ fn nearest_across(
     obstacle: Obstacle,
 ) -> Option<Nearest> {
     let options = VoxelOptions {
-        patient: None,
-        lesions: &[],
-        off: &[],
-        needle_m: 0.15,
-        markers: &[],
-        outside_m: 0.05,
-        lung_vessel_m: 0.0,
         below_rib_m: 0.0,
-        beside_sternum_m: 20e-3,
-        threads: 1,
-        cancel: &GO,
+        ..usual()
     };
     let in_lung = Point3::new(65.0 * 2e-3, 30.0 * 2e-3, 0.01);
     let anatomy = VoxelAnatomy::new(labels, Vector3::zeros(), in_lung, &options).unwrap();
@@ -568,19 +558,7 @@ fn what_lies_between_the_lungs_is_no_way_out_of_the_body() {
             (BONE, "bone"),
         ],
     );
-    let options = VoxelOptions {
-        patient: None,
-        lesions: &[],
-        off: &[],
-        needle_m: 0.15,
-        markers: &[],
-        outside_m: 0.05,
-        lung_vessel_m: 0.0,
-        below_rib_m: 3e-3,
-        beside_sternum_m: 20e-3,
-        threads: 1,
-        cancel: &GO,
-    };
+    let options = usual();
     let in_lung = Point3::new(65.0 * 2e-3, 30.0 * 2e-3, 0.01);
     let anatomy = VoxelAnatomy::new(&labels, Vector3::zeros(), in_lung, &options).unwrap();
     let ray = Ray {
@@ -664,17 +642,8 @@ fn refinement_never_makes_a_route_worse() {
 fn targets_outside_are_refused() {
     let labels = chest(false);
     let options = VoxelOptions {
-        patient: None,
-        lesions: &[],
-        off: &[],
         needle_m: 0.1,
-        markers: &[],
-        outside_m: 0.05,
-        lung_vessel_m: 0.0,
-        below_rib_m: 3e-3,
-        beside_sternum_m: 20e-3,
-        threads: 1,
-        cancel: &GO,
+        ..usual()
     };
     for (target, words) in [
         (Point3::new(-0.089, -0.069, 0.09), "outside the body"),

@@ -5,22 +5,17 @@ use std::path::{Path, PathBuf};
 
 use needlebench_imaging::read::ReadOptions;
 
-use super::made::{Slice, read, read_slices, refusal, remarks, stack, write};
+use super::made::{Slice, item, read, read_slices, refusal, remarks, stack, write};
 
 /// An index that names files.
 fn index(names: &[&str]) -> Vec<u8> {
     let mut records = Vec::new();
     // A record of the patient names no file.
     for name in std::iter::once(None).chain(names.iter().copied().map(Some)) {
-        let mut record = Vec::new();
-        write(&mut record, 0x0004_1430, *b"CS", b"IMAGE");
-        if let Some(name) = name {
-            write(&mut record, 0x0004_1500, *b"CS", name.as_bytes());
-        }
-        write(&mut record, 0x0010_0010, *b"PN", b"Zyxwvut^Abcdefg");
-        records.extend([0xFE, 0xFF, 0x00, 0xE0]);
-        records.extend(u32::try_from(record.len()).unwrap().to_le_bytes());
-        records.extend(record);
+        let mut record = vec![(0x0004_1430, *b"CS", b"IMAGE".to_vec())];
+        record.extend(name.map(|name| (0x0004_1500, *b"CS", name.as_bytes().to_vec())));
+        record.push((0x0010_0010, *b"PN", b"Zyxwvut^Abcdefg".to_vec()));
+        records.extend(item(&record));
     }
     let mut bytes = vec![0; 128];
     bytes.extend(b"DICM");

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use needlebench_imaging::read::{ReadLabels, ReadOptions, read_labels};
 use needlebench_imaging::{ImagingError, VoxelGrid};
 
-use super::made::{SIZE, Slice, nifti, read_as, refusal, write};
+use super::made::{SIZE, Slice, item, nifti, read_as, refusal};
 
 fn labels_as(name: &str, bytes: &[u8], grid: &VoxelGrid) -> Result<ReadLabels, ImagingError> {
     let folder = tempfile::tempdir().unwrap();
@@ -62,16 +62,6 @@ fn labels_of_another_volume_and_what_is_no_label_are_refused() {
 
 /// A segmentation of the slices at 0 and 2 mm: bits of a pattern for each of two segments.
 fn segmentation(kind: &str, positions: &[&str]) -> Vec<u8> {
-    let item = |elements: &[(u32, [u8; 2], Vec<u8>)]| {
-        let mut inner = Vec::new();
-        for (tag, vr, value) in elements {
-            write(&mut inner, *tag, *vr, value);
-        }
-        let mut bytes = vec![0xFE, 0xFF, 0x00, 0xE0];
-        bytes.extend(u32::try_from(inner.len()).unwrap().to_le_bytes());
-        bytes.extend(inner);
-        bytes
-    };
     let short = |number: u16| number.to_le_bytes().to_vec();
     let segment = |number: u16, label: &str, meaning: &str, side: &str| {
         let side = item(&[(0x0008_0104, *b"LO", side.as_bytes().to_vec())]);

@@ -312,3 +312,15 @@ pub fn stack(count: u32) -> Vec<Slice> {
         .map(|at| Slice::at(f64::from(at) * 2.0))
         .collect()
 }
+
+/// An item of a sequence.
+pub fn item(elements: &[(u32, [u8; 2], Vec<u8>)]) -> Vec<u8> {
+    let mut inner = Vec::new();
+    for (tag, vr, value) in elements {
+        write(&mut inner, *tag, *vr, value);
+    }
+    let mut bytes = vec![0xFE, 0xFF, 0x00, 0xE0];
+    bytes.extend(u32::try_from(inner.len()).unwrap().to_le_bytes());
+    bytes.extend(inner);
+    bytes
+}

@@ -5,21 +5,10 @@ use std::sync::atomic::AtomicBool;
 use needlebench_imaging::read::{ReadLabels, ReadOptions, ScanIdentity, read_labels};
 use needlebench_imaging::{ImagingError, SurfaceTissue, structure_of};
 
-use super::made::{Slice, refusal, stack, write};
+use super::made::{Slice, item, refusal, stack};
 
 /// Of the CT and of the structures.
 const FRAME: &str = "1.2.3.4";
-
-fn item(elements: &[(u32, [u8; 2], Vec<u8>)]) -> Vec<u8> {
-    let mut inner = Vec::new();
-    for (tag, vr, value) in elements {
-        write(&mut inner, *tag, *vr, value);
-    }
-    let mut bytes = vec![0xFE, 0xFF, 0x00, 0xE0];
-    bytes.extend(u32::try_from(inner.len()).unwrap().to_le_bytes());
-    bytes.extend(inner);
-    bytes
-}
 
 /// Name, type and contours: kind and points, mm.
 struct Structure<'a> {
