@@ -166,23 +166,32 @@ async function walk(page) {
 }
 
 /**
- * Switches every checkbox under "Show" there and back: the picture has to change and to come back.
+ * Switches every checkbox under "Show" there and back: the picture has to change and to come back. The couch of a scan
+ * may lie inside the table of the room: what the table hides is switched without it.
  * @param {Page} page
  */
 async function toggles(page) {
   const labels = await page.evaluate(() =>
     [...document.querySelectorAll('[aria-label="Parts of the picture"] .check')].map((label) => label.textContent),
   );
-  for (const text of labels) {
-    const box = page
-      .locator('[aria-label="Parts of the picture"] .check', { hasText: new RegExp(`^${text}$`) })
-      .locator('input');
+  /** @param {string | null} text */
+  const box = (text) =>
+    page.locator('[aria-label="Parts of the picture"] .check', { hasText: new RegExp(`^${text}$`) }).locator('input');
+  /** @param {string | null} text */
+  const isSeen = async (text) => {
     const before = await picture(page);
-    await box.click();
-    const changed = await picture(page);
-    assert.notEqual(changed, before, `switching "${text}" changes nothing`);
-    await box.click();
-    assert.equal(await picture(page), before, `switching "${text}" twice is not the same`);
+    await box(text).click();
+    const changed = (await picture(page)) !== before;
+    await box(text).click();
+    assert.ok((await picture(page)) === before, `switching "${text}" twice is not the same`);
+    return changed;
+  };
+  for (const text of labels) {
+    if (await isSeen(text)) continue;
+    assert.ok(text === 'arms, couch, objects', `switching "${text}" changes nothing`);
+    await box('table').click();
+    assert.ok(await isSeen(text), `switching "${text}" changes nothing, without the table either`);
+    await box('table').click();
   }
   return labels.length;
 }
