@@ -9,7 +9,7 @@ use needlebench_engine::{
     MotionSettings, run_motions,
 };
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
+use needlebench_kinematics::trajectory::{Between, JointTrajectory, Phase};
 use needlebench_recorded::RecordedRun;
 
 use super::arm::ReplayedArm;
@@ -76,8 +76,8 @@ pub(super) fn course(
             .iter()
             .map(|piece| {
                 let times_s = &run.time_s[piece.rows.clone()];
-                let states = target[piece.rows.clone()].to_vec();
-                JointTrajectory::sampled(Phase::Replay, times_s, states)
+                let states = &target[piece.rows.clone()];
+                JointTrajectory::sampled(Phase::Replay, Between::Quintics, times_s, states)
                     .expect("rows of a stretch increase in time and are finite")
             })
             .collect();

@@ -17,9 +17,8 @@ pub use line::LineError;
 pub use path::{JointPath, PathPoint};
 pub use piece::{Piece, PieceCourse};
 pub use profile::{DoubleS, ProfileLimits};
-pub use sampled::NotSampled;
+pub use sampled::{Between, NotSampled};
 
-use sampled::Sampled;
 use slowing::Slowing;
 
 use crate::{JOINT_COUNT, Joints};
@@ -80,6 +79,8 @@ pub enum Phase {
     Stop,
     /// Along the set-points of a recorded run.
     Replay,
+    /// Along the set-points of a motion that is judged, to a hold or away from it.
+    Travel,
 }
 
 impl Phase {
@@ -95,6 +96,7 @@ impl Phase {
             Self::Release => "release",
             Self::Stop => "stop",
             Self::Replay => "replay",
+            Self::Travel => "travel",
         }
     }
 }
@@ -117,8 +119,8 @@ enum Course {
     Hold { position: Joints },
     /// Along another trajectory, slower and slower until it stands.
     Slowing(Slowing),
-    /// Through set-points.
-    Sampled(Sampled),
+    /// Through set-points: a path whose parameter is the time, s.
+    Sampled(JointPath),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -260,6 +262,16 @@ impl JointTrajectory {
         self
     }
 
+    /// Appends another motion, which has to start where this one ends.
+    #[must_use]
+    pub fn followed_by(mut self, other: Self) -> Self {
+        for segment in other.segments {
+            self.push(segment.phase, segment.duration_s, segment.course);
+        }
+        self.end = other.end;
+        self
+    }
+
     fn push(&mut self, phase: Phase, duration_s: f64, course: Course) {
         let start_s = self.duration_s();
         self.segments.push(Segment {
@@ -339,7 +351,14 @@ impl JointTrajectory {
             }
             Course::Hold { position } => JointState::at_rest(*position),
             Course::Slowing(slowing) => slowing.sample(local_s),
-            Course::Sampled(sampled) => sampled.sample(local_s),
+            Course::Sampled(path) => {
+                let point = path.sample(local_s);
+                JointState {
+                    position: point.position,
+                    velocity: point.first,
+                    acceleration: point.second,
+                }
+            }
         }
     }
 

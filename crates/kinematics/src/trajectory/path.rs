@@ -17,7 +17,7 @@ pub(super) struct Knot {
 
 /// Joint positions over a path parameter `s`, `0 <= s <= length`: metres along a straight line of the
 /// tool ([`JointPath::line_ending_at`]), seconds at full speed through waypoints
-/// ([`JointPath::through`]).
+/// ([`JointPath::through`]), seconds through set-points ([`JointTrajectory::sampled`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointPath {
     knots: Vec<Knot>,
@@ -82,11 +82,7 @@ impl JointPath {
 
     /// Point at a parameter: quintic Hermite interpolation. The ends outside.
     pub fn sample(&self, s: f64) -> PathPoint {
-        let index = self
-            .knots
-            .partition_point(|knot| knot.s <= s)
-            .clamp(1, self.intervals())
-            - 1;
+        let index = self.interval_at(s);
         let (start, end) = self.interval(index);
         let h = end - start;
         let u = ((s - start) / h).clamp(0.0, 1.0);
@@ -97,6 +93,12 @@ impl JointPath {
             second: (c2 * 2.0 + (c3 * 6.0 + (c4 * 12.0 + c5 * (20.0 * u)) * u) * u) / (h * h),
             third: (c3 * 6.0 + (c4 * 24.0 + c5 * (60.0 * u)) * u) / (h * h * h),
         }
+    }
+
+    /// Index of the interval that a parameter is in; the first or last one outside.
+    pub(super) fn interval_at(&self, s: f64) -> usize {
+        let next = self.knots.partition_point(|knot| knot.s <= s);
+        next.clamp(1, self.intervals()) - 1
     }
 
     /// Number of intervals between knots.

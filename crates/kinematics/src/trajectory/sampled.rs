@@ -1,16 +1,8 @@
-//! A course that was sampled elsewhere: a recorded run's set-points.
+//! A course that was sampled elsewhere: set-points of a recorded run, or of a motion that is judged.
 
-use super::{Course, JointState, JointTrajectory, Phase};
+use super::path::Knot;
+use super::{Course, JointPath, JointState, JointTrajectory, Phase};
 use crate::Joints;
-
-/// Set-points at increasing times, joined by quintics that have the position, velocity and
-/// acceleration of both ends: acceleration is continuous.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Sampled {
-    /// From 0, s.
-    time_s: Vec<f64>,
-    states: Vec<JointState>,
-}
 
 /// Why set-points are not a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -35,60 +27,31 @@ pub enum NotSampled {
     },
 }
 
-impl Sampled {
-    fn interval(&self, local_s: f64) -> usize {
-        let next = self.time_s.partition_point(|time_s| *time_s <= local_s);
-        next.clamp(1, self.time_s.len() - 1) - 1
-    }
+/// What joins set-points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Between {
+    /// Quintics with the position, velocity and acceleration of both ends: acceleration is continuous.
+    Quintics,
+    /// Cubics with the position and velocity of both ends: velocity is continuous.
+    Cubics,
+    /// Straight lines at constant velocity, with corners at the set-points.
+    Lines,
+}
 
-    /// Bernstein coefficients of the quintic of an interval, rad.
-    fn coefficients(&self, index: usize) -> ([Joints; 6], f64) {
-        let h = self.time_s[index + 1] - self.time_s[index];
-        let [a, b] = [&self.states[index], &self.states[index + 1]];
-        let (first, second) = (h / 5.0, h * h / 20.0);
-        let b1 = a.position + a.velocity * first;
-        let b4 = b.position - b.velocity * first;
-        let coefficients = [
-            a.position,
-            b1,
-            a.acceleration * second + b1 * 2.0 - a.position,
-            b.acceleration * second + b4 * 2.0 - b.position,
-            b4,
-            b.position,
-        ];
-        (coefficients, h)
-    }
-
-    pub(super) fn sample(&self, local_s: f64) -> JointState {
-        let index = self.interval(local_s);
-        let (b, h) = self.coefficients(index);
-        let u = ((local_s - self.time_s[index]) / h).clamp(0.0, 1.0);
-        let lerp = |points: &[Joints]| -> Vec<Joints> {
-            points
-                .windows(2)
-                .map(|pair| pair[0] + (pair[1] - pair[0]) * u)
-                .collect()
-        };
-        // De Casteljau: three points are left for the second derivative, two for the first.
-        let three = lerp(&lerp(&lerp(&b)));
-        let two = lerp(&three);
-        JointState {
-            position: two[0] + (two[1] - two[0]) * u,
-            velocity: (two[1] - two[0]) * (5.0 / h),
-            acceleration: (three[2] - three[1] * 2.0 + three[0]) * (20.0 / (h * h)),
+impl Between {
+    /// Knots of an interval with the derivatives that the joining curve has on its inside.
+    fn ends(self, h: f64, [a, b]: [&JointState; 2]) -> [[Joints; 2]; 2] {
+        let step = (b.position - a.position) / h;
+        match self {
+            Self::Quintics => [[a.velocity, a.acceleration], [b.velocity, b.acceleration]],
+            Self::Cubics => {
+                let (v0, v1) = (a.velocity, b.velocity);
+                let from = (step * 6.0 - v0 * 4.0 - v1 * 2.0) / h;
+                let to = (v0 * 2.0 + v1 * 4.0 - step * 6.0) / h;
+                [[v0, from], [v1, to]]
+            }
+            Self::Lines => [[step, Joints::zeros()]; 2],
         }
-    }
-
-    /// Of all intervals that are touched, whole: the sum of the steps of their coefficients.
-    pub(super) fn travel(&self, from_s: f64, to_s: f64) -> Joints {
-        (self.interval(from_s)..=self.interval(to_s))
-            .map(|index| {
-                let (b, _) = self.coefficients(index);
-                b.windows(2)
-                    .map(|pair| (pair[1] - pair[0]).abs())
-                    .sum::<Joints>()
-            })
-            .sum()
     }
 }
 
@@ -96,15 +59,17 @@ impl JointTrajectory {
     /// The course through set-points at increasing times (s), from the first one's time on. It may
     /// start and end in motion.
     ///
-    /// Between two set-points runs the quintic with their positions, velocities and accelerations, so
-    /// that of a smooth course it is off by `h^6 / 46080` of its sixth derivative in position.
+    /// The quintic between two set-points has their positions, velocities and accelerations, so that of a smooth
+    /// course it is off by `h^6 / 46080` of its sixth derivative in position. Cubics do not look at accelerations, lines
+    /// not at velocities either; at a set-point where velocity or acceleration jumps, those of the later side count.
     ///
     /// # Errors
     /// [`NotSampled`].
     pub fn sampled(
         phase: Phase,
+        between: Between,
         times_s: &[f64],
-        states: Vec<JointState>,
+        states: &[JointState],
     ) -> Result<Self, NotSampled> {
         let Some((first_s, last)) = times_s.first().zip(states.last()) else {
             return Err(NotSampled::TooFew);
@@ -131,14 +96,25 @@ impl JointTrajectory {
         if let Some(index) = times_s.windows(2).position(not_after) {
             return Err(NotSampled::NotIncreasing { index: index + 1 });
         }
-        let end = last.position;
-        let duration_s = times_s[times_s.len() - 1] - first_s;
-        let course = Sampled {
-            time_s: times_s.iter().map(|time_s| time_s - first_s).collect(),
-            states,
-        };
-        let mut trajectory = Self::starting_at(end);
-        trajectory.push(phase, duration_s, Course::Sampled(course));
+        let mut knots: Vec<Knot> = Vec::with_capacity(states.len());
+        for (states, times_s) in states.windows(2).zip(times_s.windows(2)) {
+            let ends = between.ends(times_s[1] - times_s[0], [&states[0], &states[1]]);
+            for (state, (time_s, [first, second])) in states.iter().zip(times_s.iter().zip(ends)) {
+                let knot = Knot {
+                    s: time_s - first_s,
+                    position: state.position,
+                    first,
+                    second,
+                };
+                // Where nothing jumps, both sides have one knot.
+                if knots.last() != Some(&knot) {
+                    knots.push(knot);
+                }
+            }
+        }
+        let path = JointPath::from_knots(knots);
+        let mut trajectory = Self::starting_at(last.position);
+        trajectory.push(phase, path.length(), Course::Sampled(path));
         Ok(trajectory)
     }
 }
@@ -161,8 +137,8 @@ mod tests {
     }
 
     fn of_quintic(times_s: &[f64]) -> JointTrajectory {
-        let states = times_s.iter().map(|t| quintic(*t)).collect();
-        JointTrajectory::sampled(Phase::Replay, times_s, states).unwrap()
+        let states: Vec<JointState> = times_s.iter().map(|t| quintic(*t)).collect();
+        JointTrajectory::sampled(Phase::Replay, Between::Quintics, times_s, &states).unwrap()
     }
 
     #[test]
@@ -176,6 +152,37 @@ mod tests {
             assert!((found.position - wanted.position).amax() < ROUNDING);
             assert!((found.velocity - wanted.velocity).amax() < ROUNDING);
             assert!((found.acceleration - wanted.acceleration).amax() < 1e-9);
+        }
+    }
+
+    /// A cubic is met by cubics whatever accelerations are written, and polygons by lines, on whose corners the later
+    /// velocity counts.
+    #[test]
+    fn cubics_and_lines_are_met() {
+        let times_s = [0.5, 0.6, 1.0, 1.9];
+        let at = |t: f64| JointState {
+            position: Joints::repeat(0.2 + t.powi(3) - t),
+            velocity: Joints::repeat(3.0 * t * t - 1.0),
+            acceleration: Joints::repeat(7.0),
+        };
+        let states = times_s.map(at);
+        let made =
+            |between| JointTrajectory::sampled(Phase::Travel, between, &times_s, &states).unwrap();
+        let (cubics, lines) = (made(Between::Cubics), made(Between::Lines));
+        for k in 0..100 {
+            let t = 0.5 + 1.4 * f64::from(k) / 100.0;
+            let (found, wanted) = (cubics.sample(t - 0.5), at(t));
+            assert!((found.position - wanted.position).amax() < ROUNDING);
+            assert!((found.velocity - wanted.velocity).amax() < ROUNDING);
+            assert!((found.acceleration[0] - 6.0 * t).abs() < 1e-9);
+            let later = times_s.iter().position(|each| *each > t).unwrap();
+            let (a, b) = (&states[later - 1].position, &states[later].position);
+            let span_s = times_s[later] - times_s[later - 1];
+            let wanted = a + (b - a) * ((t - times_s[later - 1]) / span_s);
+            let found = lines.sample(t - 0.5);
+            assert!((found.position - wanted).amax() < ROUNDING);
+            assert!((found.velocity - (b - a) / span_s).amax() < ROUNDING);
+            assert!(found.acceleration.amax() < 1e-9);
         }
     }
 
@@ -195,7 +202,8 @@ mod tests {
     fn what_is_no_course_is_refused() {
         let state = quintic(0.0);
         let refused = |times_s: &[f64], states: Vec<JointState>| {
-            JointTrajectory::sampled(Phase::Replay, times_s, states).unwrap_err()
+            JointTrajectory::sampled(Phase::Replay, Between::Quintics, times_s, &states)
+                .unwrap_err()
         };
         assert_eq!(refused(&[], vec![]), NotSampled::TooFew);
         assert_eq!(refused(&[0.0], vec![state]), NotSampled::TooFew);

@@ -1,8 +1,9 @@
 //! Bounds on what the joints do between two moments of a trajectory.
 //!
 //! Proven, not sampled. A straight course follows a monotone profile, so its joints travel what
-//! lies between the ends. A line's joints are quintics of the distance; in Bernstein form on the
-//! part of a quintic that is passed, `q(v) = sum b_i B_i(v)`, two facts bound them:
+//! lies between the ends. A line's joints are quintics of the distance, those between set-points of
+//! the time; in Bernstein form on the part of a quintic that is passed, `q(v) = sum b_i B_i(v)`, two
+//! facts bound them:
 //!
 //! - `q' = 5 sum (b_{i+1} - b_i) B_i`, each basis polynomial of degree four is not negative and
 //!   has the integral 1/5, so the path is no longer than `sum |b_{i+1} - b_i|`;
@@ -84,7 +85,7 @@ impl Segment {
             }
             Course::Hold { .. } => Joints::zeros(),
             Course::Slowing(slowing) => slowing.travel(from_s, to_s),
-            Course::Sampled(sampled) => padded(&sampled.travel(from_s, to_s)),
+            Course::Sampled(path) => padded(&path.travel(from_s, to_s)),
         }
     }
 
@@ -102,8 +103,7 @@ impl Segment {
                 padded(&path.chord_deviation(s_m(from_s), s_m(to_s)))
             }
             Course::Slowing(slowing) => slowing.chord_deviation(from_s, to_s),
-            // Both ends together are no farther from any point of the way than its length.
-            Course::Sampled(sampled) => padded(&(sampled.travel(from_s, to_s) * 0.5)),
+            Course::Sampled(path) => padded(&path.chord_deviation(from_s, to_s)),
         }
     }
 }
@@ -149,7 +149,8 @@ impl JointPath {
 
     /// The path between two distances, cut at the knots.
     fn parts(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = Part> + '_ {
-        (0..self.intervals()).filter_map(move |index| {
+        let (first, last) = (self.interval_at(from_m), self.interval_at(to_m));
+        (first..=last).filter_map(move |index| {
             let (start_m, end_m) = self.interval(index);
             let h = end_m - start_m;
             // The ends of the line belong to the outer quintics, whatever rounding says.
@@ -208,7 +209,7 @@ const BINOMIAL: [[f64; 6]; 6] = [
 mod tests {
     use nalgebra::{UnitVector3, Vector3};
 
-    use super::super::{MotionLimits, Phase, ProfileLimits};
+    use super::super::{Between, JointState, MotionLimits, Phase, ProfileLimits};
     use super::*;
     use crate::{JOINT_COUNT, UrGeometry};
     use needlebench_numerics::random::SplitMix64;
@@ -233,7 +234,7 @@ mod tests {
         };
         let chain = UrGeometry::UR3.chain();
         let mut random = SplitMix64::new(31);
-        (0..6)
+        let planned: Vec<JointTrajectory> = (0..6)
             .map(|_| {
                 let posture = Joints::from_column_slice(&[-0.7, -2.2, -1.9, 0.1, 1.3, 0.1])
                     + Joints::from_fn(|_, _| random.uniform(-0.2, 0.2));
@@ -247,7 +248,30 @@ mod tests {
                     .then_along(Phase::Approach, line, &limits)
                     .then_hold(Phase::Hold, 0.5)
             })
-            .collect()
+            .collect();
+        let joined = [Between::Quintics, Between::Cubics, Between::Quintics];
+        let set_points = joined.into_iter().zip(&planned);
+        let set_points = set_points.map(|(between, motion)| of_set_points(motion, between));
+        let mut all: Vec<JointTrajectory> = set_points.collect();
+        all.extend(planned);
+        all
+    }
+
+    /// The same motion by its set-points every 20 ms.
+    fn of_set_points(motion: &JointTrajectory, between: Between) -> JointTrajectory {
+        let start = JointTrajectory::starting_at(motion.sample(0.0).position);
+        let parts = motion.phases().into_iter();
+        parts.fold(start, |whole, (phase, start_s, end_s)| {
+            let count = ((end_s - start_s) / 0.02).ceil();
+            let times_s: Vec<f64> = (0..)
+                .map(f64::from)
+                .take_while(|k| *k <= count)
+                .map(|k| start_s + (end_s - start_s) * k / count)
+                .collect();
+            let states: Vec<JointState> = times_s.iter().map(|t| motion.sample(*t)).collect();
+            let part = JointTrajectory::sampled(phase, between, &times_s, &states);
+            whole.followed_by(part.expect("times increase"))
+        })
     }
 
     fn intervals(trajectory: &JointTrajectory) -> Vec<(f64, f64)> {
@@ -356,7 +380,7 @@ mod tests {
 
     #[test]
     fn straight_courses_and_rests_do_not_leave_their_chord_and_rests_do_not_travel() {
-        let trajectory = &motions()[0];
+        let trajectory = &motions()[8];
         let phases = trajectory.phases();
         let (_, from_s, to_s) = phases[0];
         assert_eq!(trajectory.chord_deviation(from_s, to_s), Joints::zeros());
