@@ -278,7 +278,7 @@ const OWNERS: [(&str, &[&str]); 21] = [
         ],
     ),
     ("roxmltree", &["robot"]),
-    ("granit-parser", &["robot"]),
+    ("granit-parser", &["input"]),
     ("stl_io", &["geometry"]),
     ("parquet", &["study"]),
     ("zstd", &["study"]),

@@ -20,6 +20,7 @@ mod read;
 pub mod schema;
 mod toml_text;
 mod toml_value;
+mod yaml_text;
 
 pub use delimited::Separator;
 pub use file_kind::{FileKind, or_wrong_kind};
@@ -30,3 +31,4 @@ pub use printable::{commented, printable, printable_json, printable_line};
 pub use read::{InputError, open_input, read_data, read_data_text, read_text};
 pub use toml_text::TomlText;
 pub use toml_value::{from_toml, read_table, read_value, to_toml};
+pub use yaml_text::{YamlEntry, YamlNode, YamlValue, parse_yaml, parse_yaml_documents};

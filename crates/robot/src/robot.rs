@@ -11,7 +11,6 @@ mod parametric;
 mod srdf;
 mod tool;
 mod urdf;
-mod yaml_text;
 
 use std::ops::Range;
 use std::sync::Arc;

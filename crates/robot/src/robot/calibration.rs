@@ -16,13 +16,15 @@ use std::ops::Range;
 use std::path::Path;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
-use needlebench_input::{Finding, ModelSource, commented, nearest_name, read_text, source_of};
+use needlebench_input::{
+    Finding, ModelSource, YamlEntry, YamlNode, YamlValue, commented, nearest_name, parse_yaml,
+    read_text, source_of,
+};
 use needlebench_kinematics::{
     Chain, ChainJoint, JOINT_COUNT, JOINT_LABELS, Pose, UrGeometry, UrModel, base_from_base_link,
     rotation_angle_between,
 };
 
-use super::yaml_text::{YamlEntry, YamlNode, YamlValue, parse_yaml};
 use crate::AppliedCalibration;
 use crate::LoadedRobot;
 

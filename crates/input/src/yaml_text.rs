@@ -1,60 +1,99 @@
-//! YAML files as trees in which every key and value knows its place.
+//! YAML files, JSON among them, as trees in which every key and value knows its place.
 //!
-//! Read from the parser's events rather than into structs: the few files that are YAML are small,
-//! and every complaint names a line.
+//! Read from the parser's events rather than into structs, so that every complaint names a line.
 
 use std::borrow::Cow;
 use std::ops::Range;
 
 use granit_parser::{Event, Parser, Span, Tag};
 
-use needlebench_input::Finding;
+use crate::Finding;
 
-/// Nothing that is read here is deeper than three levels.
+/// Nothing that is read here is deeper than eight levels.
 const DEEPEST: usize = 16;
 
 /// A value with its place in the text.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct YamlNode {
+pub struct YamlNode {
+    /// Its place, bytes.
     pub span: Range<usize>,
+    /// What it is.
     pub value: YamlValue,
 }
 
+/// What a value is.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum YamlValue {
+pub enum YamlValue {
     /// Text as written, without quotes.
     Scalar(String),
     /// Keys in the order of the file, each once.
     Map(Vec<YamlEntry>),
+    /// Values in their order.
     Sequence(Vec<YamlNode>),
 }
 
+/// A key with its value.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct YamlEntry {
+pub struct YamlEntry {
+    /// The key.
     pub key: String,
+    /// Its place, bytes.
     pub key_span: Range<usize>,
+    /// The value.
     pub node: YamlNode,
 }
 
+impl YamlNode {
+    /// Value of a key, if this is a map that has it.
+    pub fn get(&self, key: &str) -> Option<&Self> {
+        let YamlValue::Map(entries) = &self.value else {
+            return None;
+        };
+        let found = entries.iter().find(|entry| entry.key == key)?;
+        Some(&found.node)
+    }
+}
+
 /// Parses a file that holds one document.
-pub(crate) fn parse_yaml(file: &str, text: &str) -> Result<YamlNode, Finding> {
+///
+/// # Errors
+/// What is not YAML, or not supported: aliases, tags, keys that are no words, keys twice, a second document.
+pub fn parse_yaml(file: &str, text: &str) -> Result<YamlNode, Finding> {
+    let mut all = parse_yaml_documents(file, text)?.into_iter();
+    let empty = || Finding::new(file, "the file is empty");
+    let first = all.next().ok_or_else(empty)?;
+    match all.next() {
+        None => Ok(first),
+        Some(second) => {
+            Err(Finding::new(file, "a second YAML document begins here").at(text, second.span))
+        }
+    }
+}
+
+/// Parses a file of any number of documents; those without content are left out.
+///
+/// # Errors
+/// As [`parse_yaml`].
+pub fn parse_yaml_documents(file: &str, text: &str) -> Result<Vec<YamlNode>, Finding> {
     let mut reader = Reader {
         file,
         text,
         events: Parser::new_from_str(text),
     };
-    let mut root = None;
+    let mut documents = Vec::new();
     loop {
         match reader.next()? {
-            None | Some((Event::StreamEnd, _)) => break,
+            None | Some((Event::StreamEnd, _)) => return Ok(documents),
             Some((Event::StreamStart | Event::DocumentStart(..) | Event::DocumentEnd, _)) => {}
-            Some((_, span)) if root.is_some() => {
-                return Err(reader.finding(&span, "a second YAML document begins here"));
+            Some((event, span)) => {
+                let root = reader.node(event, &span, 0)?;
+                if !matches!(&root.value, YamlValue::Scalar(text) if root.span.is_empty() && text.is_empty() || text == "~")
+                {
+                    documents.push(root);
+                }
             }
-            Some((event, span)) => root = Some(reader.node(event, &span, 0)?),
         }
     }
-    root.ok_or_else(|| Finding::new(file, "the file is empty"))
 }
 
 struct Reader<'a> {
