@@ -181,6 +181,30 @@ fn hash_of(file: std::fs::File) -> std::io::Result<String> {
 /// Topic on which ROS has the states of an arm's joints.
 const ROS_TOPIC: &str = "/joint_states";
 
+/// Topics with joint states.
+pub(crate) fn joint_state_topics(path: &Path, file: &str) -> Result<Vec<String>, Vec<Finding>> {
+    let refuse = |message: String| vec![Finding::new(file, message).hint(STILL_THERE)];
+    let input = open_input(path).map_err(|error| refuse(error.to_string()))?;
+    let (topics, _) = topics(BufReader::new(input)).map_err(refuse)?;
+    Ok(topics.into_keys().collect())
+}
+
+/// Messages with joint states by topic, and what broke the file off.
+fn topics(input: impl Read + Seek) -> Result<(BTreeMap<String, usize>, Option<String>), String> {
+    let mut topics: BTreeMap<String, usize> = BTreeMap::new();
+    for message in messages(input).map_err(|error| error.to_string())? {
+        let message = match message {
+            Ok(message) => message,
+            Err(error) => return Ok((topics, Some(error.to_string()))),
+        };
+        let kind = message.message_type();
+        if kind.is_some_and(|kind| kind.ends_with("JointState")) {
+            *topics.entry(message.topic().to_owned()).or_default() += 1;
+        }
+    }
+    Ok((topics, None))
+}
+
 /// The topic of joint states: the only one, the one that is named, or that of ROS; with what else there is, where nobody
 /// chose.
 fn choose_topic(
@@ -189,29 +213,14 @@ fn choose_topic(
     wanted: Option<&str>,
 ) -> Result<(String, Option<String>), Vec<Finding>> {
     let refuse = |message: String, hint: String| Err(vec![Finding::new(file, message).hint(hint)]);
-    let mut topics: BTreeMap<String, usize> = BTreeMap::new();
-    let all = match messages(input) {
-        Ok(all) => all,
-        Err(error) => return refuse(error.to_string(), STILL_THERE.to_owned()),
+    let (topics, broken) = match topics(input) {
+        Ok(found) => found,
+        Err(error) => return refuse(error, STILL_THERE.to_owned()),
     };
-    let mut broken = None;
-    for message in all {
-        let message = match message {
-            Ok(message) => message,
-            Err(error) => {
-                broken = Some(error);
-                break;
-            }
-        };
-        let kind = message.message_type();
-        if kind.is_some_and(|kind| kind.ends_with("JointState")) {
-            *topics.entry(message.topic().to_owned()).or_default() += 1;
-        }
-    }
     let names: Vec<&str> = topics.keys().map(String::as_str).collect();
     match (wanted, names.as_slice()) {
         (_, []) if broken.is_some() => {
-            let error = broken.as_ref().map(ToString::to_string).unwrap_or_default();
+            let error = broken.unwrap_or_default();
             refuse(format!("cannot read the log: {error}"), CUT_OFF.to_owned())
         }
         (_, []) => refuse(
@@ -251,7 +260,9 @@ fn two_arms(file: &str, topic: &str, first: &str, other: &str) -> Vec<Finding> {
 ///
 /// # Errors
 /// A joint that is there twice.
-fn places(names: &[String]) -> Result<Option<([usize; JOINT_COUNT], &str)>, &'static str> {
+pub(crate) fn places(
+    names: &[String],
+) -> Result<Option<([usize; JOINT_COUNT], &str)>, &'static str> {
     let mut found = [None; JOINT_COUNT];
     for (at, name) in names.iter().enumerate() {
         let joint = JOINT_NAMES.iter().position(|joint| name.ends_with(joint));

@@ -14,6 +14,7 @@ mod derivative;
 mod identify;
 mod joint_states;
 mod lag;
+mod motion_file;
 mod options;
 mod quantity;
 mod raw;
@@ -32,6 +33,7 @@ pub use identify::{
     MeasuredFit, identify,
 };
 pub use lag::{Tracking, tracking};
+pub use motion_file::{Known, MotionFile, MotionOptions, MotionSource, read_motion};
 pub use options::{AngleUnit, EffortMeaning, ReadOptions, TimeUnit};
 pub use quantity::Quantity;
 pub use run::{Effort, Load, LogKind, LogSource, RecordedRun};
