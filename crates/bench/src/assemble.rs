@@ -105,6 +105,7 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
         goals,
         iso9283: None,
         excitation: None,
+        judged: None,
         engine_failures: results.failures,
         arm: resolved
             .robot_description

@@ -23,6 +23,7 @@ mod entry;
 mod events;
 pub mod excitation;
 mod iso9283;
+pub mod judge;
 pub mod motion;
 mod plan;
 pub mod preview;

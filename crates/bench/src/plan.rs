@@ -49,10 +49,17 @@ pub(crate) fn plan_goals(setup: &Setup<'_>, control: &Control<'_>) -> Planned {
         control.progress.step();
         plan
     });
-    Planned {
-        simulated: simulated(setup, &goals),
-        feasible: feasible(&goals),
-        goals,
+    Planned::of(setup, goals)
+}
+
+impl Planned {
+    /// Plans, from wherever they are, with what is done with them.
+    pub(crate) fn of(setup: &Setup<'_>, goals: Vec<GoalPlan>) -> Self {
+        Self {
+            simulated: simulated(setup, &goals),
+            feasible: feasible(&goals),
+            goals,
+        }
     }
 }
 

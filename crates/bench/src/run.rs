@@ -63,15 +63,24 @@ pub fn run(
     } else if let Some(plan) = runnable.protocol() {
         iso9283::run(runnable.scenario(), plan, &engines, &control)?
     } else {
-        run_goals(runnable.scenario(), options, &engines, &control)?
+        run_goals(runnable.scenario(), options, &engines, &control, plan_goals)?
     };
-    judge_alone(&mut finished.report, runnable.scenario(), options, &engines);
-    judge_unseen(&mut finished.report, runnable.scenario());
-    judge_cuts(&mut finished.report, runnable.scenario());
-    judge_absent(&mut finished.report, runnable.scenario(), &engines);
-    let requirements = &runnable.scenario().scenario.requirements;
-    trace(&mut finished.report, requirements);
+    judge_rest(&mut finished.report, runnable.scenario(), options, &engines);
     Ok(finished)
+}
+
+/// Evaluates what no configuration decides by itself, and what requirements come to.
+pub(crate) fn judge_rest(
+    report: &mut Report,
+    resolved: &ResolvedScenario,
+    options: &RunOptions,
+    engines: &[&'static dyn Engine],
+) {
+    judge_alone(report, resolved, options, engines);
+    judge_unseen(report, resolved);
+    judge_cuts(report, resolved);
+    judge_absent(report, resolved, engines);
+    trace(report, &resolved.scenario.requirements);
 }
 
 /// Beginning of the note on criteria that the choice of engines leaves out.
@@ -292,17 +301,19 @@ pub fn run_scenario(
     run(&runnable, options, &AtomicBool::new(false), &Silent)
 }
 
-fn run_goals(
+/// Simulates, measures and judges the plans that `plan` makes of the goals.
+pub(crate) fn run_goals(
     resolved: &ResolvedScenario,
     options: &RunOptions,
     engines: &[&'static dyn Engine],
     control: &Control<'_>,
+    plan: impl FnOnce(&Setup<'_>, &Control<'_>) -> Planned,
 ) -> Result<ScenarioRun, RunError> {
     let mut timings = Timings::start();
     let model = ClearanceModel::new(&resolved.cell);
     let setup = Setup::new(resolved, &model)?;
     let pool = EnginePool::new(engines);
-    let planned = plan_while_engines_start(&setup, &pool, engines, control);
+    let planned = plan_while_engines_start(&setup, &pool, engines, control, plan);
     timings.lap("planning_s");
     let plans = &planned.goals;
     tell_plans(resolved, plans);
@@ -423,6 +434,7 @@ fn plan_while_engines_start(
     pool: &EnginePool,
     engines: &[&'static dyn Engine],
     control: &Control<'_>,
+    plan: impl FnOnce(&Setup<'_>, &Control<'_>) -> Planned,
 ) -> Planned {
     let settings = &setup.resolved.scenario.engines.settings();
     std::thread::scope(|scope| {
@@ -433,7 +445,7 @@ fn plan_while_engines_start(
                 let _ = pool.start(*engine, settings, &mut tell);
             });
         }
-        plan_goals(setup, control)
+        plan(setup, control)
     })
 }
 

@@ -15,6 +15,7 @@ pub mod events;
 pub mod excitation;
 pub mod iso9283;
 mod judge;
+pub mod judged;
 pub mod metric;
 mod motion;
 mod needle;

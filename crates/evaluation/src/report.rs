@@ -13,6 +13,7 @@ pub use crate::class_clearance::{ClassClearance, ClearanceReport};
 use crate::events::EventsReport;
 use crate::excitation::ExcitationReport;
 use crate::iso9283::Iso9283Report;
+use crate::judged::JudgedReport;
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
 use crate::ranking_report::{Dominance, GoalRanking, RankingReport};
@@ -49,6 +50,9 @@ pub struct Report {
     /// The excitation run, in place of goals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excitation: Option<ExcitationReport>,
+    /// The motion from a file that was judged; none where the motions are planned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub judged: Option<JudgedReport>,
     /// Engines that failed, and how; their results are missing.
     pub engine_failures: Vec<EngineFailure>,
     /// The arm whose data the robot has; none if its lengths are those of no arm that is known.

@@ -92,7 +92,7 @@ impl Planner<'_> {
 
     /// Which rule a class violates, what its two bodies do, in words, and their distance, m: the certified bound,
     /// of bodies that were not seen to touch 0 at least.
-    fn broken(found: &ClassCertificate) -> (Rule, &'static str, f64) {
+    pub(crate) fn broken(found: &ClassCertificate) -> (Rule, &'static str, f64) {
         let attained_m = found.attained.separation.distance_m;
         let (rule, does) = of_distance(attained_m);
         let bound_m = found.lower_bound_m.min(attained_m);
@@ -105,7 +105,10 @@ impl Planner<'_> {
     }
 
     /// The class that is farthest below its floor along a motion, if any is.
-    fn deepest<'c>(&self, certificate: &'c MotionCertificate) -> Option<&'c ClassCertificate> {
+    pub(crate) fn deepest<'c>(
+        &self,
+        certificate: &'c MotionCertificate,
+    ) -> Option<&'c ClassCertificate> {
         certificate
             .iter()
             .filter(|(class, _)| class.is_physical())

@@ -7,6 +7,7 @@
 mod blocked;
 pub mod excitation;
 mod family;
+mod given;
 pub mod iso9283;
 mod limits;
 mod margin;
@@ -21,6 +22,7 @@ mod route;
 mod transfer;
 
 pub use family::{Aim, Best, EDGE_RAD, Edge, Family, Member, Merit, RollRange};
+pub use given::{GivenMotion, Held, Nearest};
 pub use limits::{ByClass, ClassLimit, ClassLimits, Shortfall};
 pub use margin::{ClassMargin, LimitedBy, Margin, SearchEnd, Straight};
 pub use motion::MotionChecker;

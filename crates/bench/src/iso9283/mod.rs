@@ -104,6 +104,7 @@ pub(crate) fn run(
             truth: setup.real.report(),
             notes: notes(resolved, &chosen),
             iso9283: Some(report),
+            judged: None,
             engine_failures: failures,
             ..empty_report(resolved, identities, timings)
         },
@@ -263,6 +264,7 @@ pub(crate) fn empty_report(
         goals: Vec::new(),
         iso9283: None,
         excitation: None,
+        judged: None,
         engine_failures: Vec::new(),
         arm: resolved
             .robot_description

@@ -130,11 +130,20 @@ impl ResolvedScenario {
     /// Without a goal of this index.
     #[must_use]
     pub fn with_goal_alone(&self, index: usize) -> Self {
-        let mut alone = self.clone();
-        alone.goals = vec![self.goals[index].clone()];
-        alone.scenario.goals = vec![self.scenario.goals[index].clone()];
-        alone.people.by_goal = vec![self.people.by_goal[index].clone()];
-        alone
+        self.with_goals(&[index])
+    }
+
+    /// The scenario with some of its goals, in this order.
+    #[must_use]
+    pub fn with_goals(&self, indices: &[usize]) -> Self {
+        fn chosen<T: Clone>(all: &[T], indices: &[usize]) -> Vec<T> {
+            indices.iter().map(|index| all[*index].clone()).collect()
+        }
+        let mut some = self.clone();
+        some.goals = chosen(&self.goals, indices);
+        some.scenario.goals = chosen(&self.scenario.goals, indices);
+        some.people.by_goal = chosen(&self.people.by_goal, indices);
+        some
     }
 }
 
