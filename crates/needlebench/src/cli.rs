@@ -13,10 +13,10 @@ use crate::clock;
 use crate::command::{
     self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, CtArguments,
     DOCTOR_HELP, DoctorArguments, ExportArguments, FkArguments, ISO9283_HELP, IkArguments,
-    InitArguments, Iso9283Arguments, MergeArguments, PairsArguments, PaperArguments, REPLAY_HELP,
-    REPORT_HELP, RecordPlanArguments, ReplayArguments, ReportArguments, RunArguments, SEARCH_HELP,
-    STUDY_HELP, SchemaFormat, SearchArguments, ServoArguments, StudyArguments, SuggestArguments,
-    VIEW_HELP, ViewArguments,
+    InitArguments, Iso9283Arguments, JUDGE_HELP, JudgeArguments, MergeArguments, PairsArguments,
+    PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
+    ReportArguments, RunArguments, SEARCH_HELP, STUDY_HELP, SchemaFormat, SearchArguments,
+    ServoArguments, StudyArguments, SuggestArguments, VIEW_HELP, ViewArguments,
 };
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
@@ -136,6 +136,12 @@ enum Command {
         after_long_help = REPLAY_HELP
     )]
     Replay(Box<ReplayArguments>),
+    /// Judge a motion that another planner or program made, before any arm moves.
+    #[command(
+        after_help = "Example: needlebench judge scenarios/table3.toml --motion plan.json",
+        after_long_help = JUDGE_HELP
+    )]
+    Judge(Box<JudgeArguments>),
     /// List collision pairs, enabled or disabled, with reasons; check an SRDF.
     #[command(after_help = "Example: needlebench pairs scenarios/table3.toml --srdf arm.srdf")]
     Pairs(PairsArguments),
@@ -267,6 +273,7 @@ fn carried_out(command: Command) -> Result<ExitStatus, Failure> {
         Command::Iso9283(arguments) => command::iso9283(&arguments),
         Command::RecordPlan(arguments) => command::record_plan(&arguments),
         Command::Replay(arguments) => command::replay(&arguments),
+        Command::Judge(arguments) => command::judge(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Servo(arguments) => command::servo(&arguments),
         Command::Report(arguments) => command::report(&arguments),

@@ -19,7 +19,7 @@ use needlebench_evaluation::report::Report;
 use needlebench_input::Finding;
 use needlebench_report::files::{Folder, RunFiles, write_run};
 use needlebench_report::{junit, markdown, report_screen, report_text, write_atomically};
-use needlebench_scenario::Overrides;
+use needlebench_scenario::{Overrides, ResolvedScenario};
 use serde::Serialize;
 
 use super::results_folder::{ResultsFolder, prepare_folder, probe_file};
@@ -287,17 +287,37 @@ pub(super) fn run_into(
     let progress = TerminalProgress::new(outputs.quiet);
     // A robot that is not a UR arm was rejected while the scenario was read.
     let finished = needlebench_bench::run(runnable, options, cancel, &progress)?;
-    let resolved = runnable.scenario();
+    put(
+        runnable.scenario(),
+        &finished,
+        options.jobs,
+        folder,
+        outputs,
+        cancel,
+        &progress,
+    )
+}
+
+/// Writes the results of a run into an existing folder, and prints them.
+pub(super) fn put(
+    resolved: &ResolvedScenario,
+    finished: &ScenarioRun,
+    jobs: usize,
+    folder: &Path,
+    outputs: Outputs,
+    cancel: &AtomicBool,
+    progress: &TerminalProgress,
+) -> Result<(ExitStatus, Report)> {
     let files = RunFiles {
         rtde: outputs.rtde,
         mcap: outputs.mcap,
         pictures: outputs.pictures,
         page: outputs.page,
-        jobs: options.jobs,
+        jobs,
         cancel,
         engines: ENGINES,
     };
-    let written = write_run(resolved, &finished, Folder(folder), files, &progress);
+    let written = write_run(resolved, finished, Folder(folder), files, progress);
     progress.finish();
     let report =
         written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
@@ -324,7 +344,7 @@ pub(super) fn run_into(
             shown(folder)
         ));
     }
-    Ok((outcome(&finished), report))
+    Ok((outcome(finished), report))
 }
 
 fn outcome(finished: &ScenarioRun) -> ExitStatus {

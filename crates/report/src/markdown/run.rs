@@ -9,6 +9,7 @@ use needlebench_show::markdown::{inline, paragraph};
 
 use super::ranking::ranking_markdown;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
+use crate::table::judged::judged_blocks;
 use crate::table::shown::{Shown, shown_metrics};
 use crate::table::true_target::true_target_in_words;
 use crate::table::verdict::{counts, qualifies, qualifying, status};
@@ -40,6 +41,9 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     }
     if is_qualified {
         writeln!(out)?;
+    }
+    if let Some(judged) = &report.judged {
+        super::study::write_blocks(out, &judged_blocks(judged))?;
     }
     for goal in &report.goals {
         writeln!(out, "## {}\n", inline(&goal.name))?;

@@ -62,7 +62,7 @@ fn write_markdown(
     Ok(())
 }
 
-fn write_blocks(out: &mut String, blocks: &[Block]) -> std::fmt::Result {
+pub(super) fn write_blocks(out: &mut String, blocks: &[Block]) -> std::fmt::Result {
     for part in blocks {
         match part {
             Block::Answer(sentence) => writeln!(out, "**{}**\n", inline(sentence))?,

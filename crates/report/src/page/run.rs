@@ -8,6 +8,7 @@ use needlebench_evaluation::report::{GoalReport, Report};
 use needlebench_evaluation::room::RoomModel;
 use needlebench_kinematics::Joints;
 use needlebench_scenario::ResolvedScenario;
+use needlebench_show::{Block, heading};
 use serde_json::{Value, json};
 
 use super::charts;
@@ -18,6 +19,7 @@ use super::room;
 use super::scene::{chain, pose, surroundings};
 use super::viewer::Viewer;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
+use crate::table::judged::judged_blocks;
 use crate::table::shown::{Shown, shown_metrics};
 use crate::table::true_target::true_target_in_words;
 use crate::table::verdict::{counts, missed_as_expected, qualifying};
@@ -62,6 +64,18 @@ pub(crate) fn run_page(
     document["goals"] = json!(goals);
     document["counts"] = json!(counts(report));
     document["qualifying"] = json!(qualifying(report).collect::<Vec<_>>());
+    document["judged"] = json!(report.judged.as_ref().map(|judged| {
+        let blocks = judged_blocks(judged);
+        let parts = blocks.iter().map(|block| match block {
+            Block::Table { header, rows } => {
+                let header: Vec<&str> = header.iter().map(|name| heading(name)).collect();
+                json!({ "header": header, "rows": rows })
+            }
+            Block::Lines(lines) => json!({ "lines": lines }),
+            Block::Answer(line) | Block::Heading(line) => json!({ "lines": [line] }),
+        });
+        parts.collect::<Vec<Value>>()
+    }));
     let expected = report.criteria.iter().enumerate();
     let expected = expected.filter(|(_, result)| missed_as_expected(report, result));
     document["missedAsExpected"] = json!(expected.map(|(index, _)| index).collect::<Vec<_>>());

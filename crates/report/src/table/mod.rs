@@ -7,6 +7,7 @@ pub(crate) mod engine_headings;
 pub(crate) mod events;
 pub mod excitation;
 pub mod iso9283;
+pub(crate) mod judged;
 pub mod overview;
 pub(crate) mod ranking;
 mod referee;

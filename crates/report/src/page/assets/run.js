@@ -122,7 +122,25 @@ class RunPage {
     );
     // What the verdict rests on stands beside it.
     const notes = this.page.qualifying.map((text) => NB.el('li', { text: `note: ${text}` }));
-    return NB.el('div', null, bar, notes.length ? NB.el('ul', { class: 'plain' }, notes) : null);
+    return NB.el('div', null, bar, notes.length ? NB.el('ul', { class: 'plain' }, notes) : null, this.judged());
+  }
+
+  /** What is said of a motion from a file: where it holds, its limits, its clearances beside those of plans. */
+  judged() {
+    if (!this.page.judged) return null;
+    return this.page.judged.map(({ lines, header, rows }) =>
+      lines
+        ? lines.map((text) => NB.el('p', { text }))
+        : NB.table(
+            'Least clearances of the motion beside those of plans to the same goal',
+            (header ?? []).map((title, at) => ({
+              title,
+              numeric: at > 0 && at !== 3,
+              cell: (/** @type {string[]} */ row) => row[at],
+            })),
+            rows ?? [],
+          ),
+    );
   }
 
   /** @param {HTMLElement} app */

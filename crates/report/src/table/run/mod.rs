@@ -14,12 +14,13 @@ use needlebench_evaluation::report::{
     ConfigurationReport, CriterionResult, GoalReport, RejectionReport, Report, RouteReport, Status,
 };
 use needlebench_show::number::value_and_limit;
-use needlebench_show::{Cell, CellAlignment, Color, Table, layout, plain_table};
+use needlebench_show::{Cell, CellAlignment, Color, Table, blocks_text, layout, plain_table};
 use needlebench_uncertainty::budget::ErrorBudget;
 
 use super::budget::{ALLOWED_M, CLINICAL_LATERAL_M, CLINICAL_M, budget_text, budgets, mm};
 use super::engine_headings::{EngineHeading, engine_headings};
 use super::events::events_text;
+use super::judged::judged_blocks;
 use super::ranking::comparison_text;
 use super::shown::{Shown, shown_metrics};
 use super::true_target::true_target_in_words;
@@ -41,6 +42,9 @@ fn write_report(
     engines: &[&'static dyn Engine],
 ) -> std::fmt::Result {
     let headings = engine_headings(report, engines);
+    if let Some(judged) = &report.judged {
+        out.push_str(&blocks_text(&judged_blocks(judged)));
+    }
     for goal in &report.goals {
         writeln!(out, "{}", goal_heading(goal))?;
         let (differing, constant) = split(goal, columns(&headings, |heading| heading.table));

@@ -9,7 +9,7 @@ use needlebench_cell::rule_in_words;
 use needlebench_engine::Engine;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status};
 use needlebench_show::number::millimetres;
-use needlebench_show::{Cell, CellAlignment, Color, Table, layout, plain_table};
+use needlebench_show::{Cell, CellAlignment, Color, Table, blocks_text, layout, plain_table};
 
 use super::{
     fissures_in_words, goal_heading, missed_in_words, rejected_in_words, route_in_words,
@@ -17,6 +17,7 @@ use super::{
 };
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::events::events_in_words;
+use crate::table::judged::judged_blocks;
 use crate::table::ranking::words;
 use crate::table::shown::shown_metrics;
 use crate::table::true_target::true_target_in_words;
@@ -50,6 +51,9 @@ fn write_screen(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         [] => {}
         [goal] => write_goal(out, report, goal, engines)?,
         goals => write_goals(out, report, goals, engines)?,
+    }
+    if let Some(judged) = &report.judged {
+        out.push_str(&blocks_text(&judged_blocks(judged)));
     }
     if let Some(iso9283) = &report.iso9283 {
         out.push_str(&crate::table::iso9283::report_text(iso9283));
@@ -112,6 +116,7 @@ fn write_goal(
     engines: &[EngineHeading],
 ) -> std::fmt::Result {
     match &goal.recommended {
+        _ if report.judged.is_some() => {}
         Some(found) => writeln!(out, "recommended: {} - {}", found.label, found.summary)?,
         None => writeln!(
             out,
@@ -124,8 +129,10 @@ fn write_goal(
         let (differing, constant) = split(goal, &rows, engines);
         let (shown, left) = that_fit(report, goal, &rows, differing);
         writeln!(out, "{}", goal_table(report, goal, &rows, &shown))?;
-        if rows.len() > 1 && !constant.is_empty() {
-            writeln!(out, "identical for all: {}", constant.join("; "))?;
+        match rows.len() {
+            _ if constant.is_empty() => {}
+            1 => writeln!(out, "{}", constant.join("; "))?,
+            _ => writeln!(out, "identical for all: {}", constant.join("; "))?,
         }
         if !left.is_empty() {
             writeln!(out, "more columns with --wide: {}", left.join(", "))?;

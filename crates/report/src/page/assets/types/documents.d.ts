@@ -101,9 +101,18 @@ interface RunDocument extends PageDocument {
   counts: string;
   /** Notes on what the verdict rests on. */
   qualifying: string[];
+  /** What is said of a motion from a file; nothing of planned ones. */
+  judged: JudgedPart[] | null;
   /** Indices of criteria. */
   missedAsExpected: number[];
   iso9283: TestCharts | null;
+}
+
+/** Sentences, or a table. */
+interface JudgedPart {
+  lines?: string[];
+  header?: string[];
+  rows?: string[][];
 }
 
 /** What the report does not have of a goal. */

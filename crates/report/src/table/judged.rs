@@ -1,0 +1,162 @@
+//! A motion from a file: where it holds, how it keeps the joints' limits, and what needlebench plans instead.
+
+use needlebench_cell::pair_in_words;
+use needlebench_evaluation::judged::{
+    HoldReport, JudgedReport, OwnPlanReport, PeakReport, SAME_CONFIGURATION,
+};
+use needlebench_show::Block;
+
+/// What is said of a judged motion: sentences, and a table of its clearances beside the plans'.
+pub fn judged_blocks(judged: &JudgedReport) -> Vec<Block> {
+    let times = if judged.has_times {
+        ""
+    } else {
+        " (the file has no times)"
+    };
+    let mut blocks = vec![Block::Lines(vec![format!(
+        "motion {}: {}, {} points, {:.3} s{times}; between points {}",
+        judged.file, judged.format, judged.points, judged.duration_s, judged.between
+    )])];
+    for hold in &judged.holds {
+        blocks.push(Block::Lines(lines(hold)));
+        blocks.extend(table(hold));
+    }
+    blocks
+}
+
+fn lines(hold: &HoldReport) -> Vec<String> {
+    let [from_s, to_s] = hold.hold_s;
+    let added = if hold.is_added {
+        " (the hold of the scenario was added)"
+    } else {
+        ""
+    };
+    let whole = hold
+        .turns
+        .filter(|turns| turns.iter().any(|turn| *turn != 0));
+    let whole = whole.map_or(String::new(), |turns| format!(", whole turns {turns:?}"));
+    let which = match (hold.label, hold.joint_off_rad) {
+        (Some(label), Some(off_rad)) => format!(
+            "in {label}{whole}, joints within {} of its solution",
+            degrees(off_rad, 3)
+        ),
+        _ => "in none of the eight: at this roll the goal's pose has no solution".to_owned(),
+    };
+    let mut lines = vec![format!(
+        "holds at {} from {from_s:.3} s to {to_s:.3} s{added} {which}; roll {}; guide {} mm and {} off its place",
+        hold.goal,
+        degrees(hold.roll_rad, 1),
+        millimetres(hold.guide_off_m),
+        degrees(hold.angle_off_rad, 3),
+    )];
+    let peaks: Vec<String> = hold.peaks.iter().map(peak).collect();
+    lines.push(format!(
+        "nearest to the joints' limits: {}",
+        peaks.join("; ")
+    ));
+    if !hold.afterwards_m.is_empty() {
+        let all = hold.afterwards_m.iter();
+        let all: Vec<String> = all
+            .map(|(class, bound_m)| format!("{class} {:.1} mm", bound_m * 1e3))
+            .collect();
+        lines.push(format!(
+            "after the hold at least, certified: {}",
+            all.join(", ")
+        ));
+    }
+    lines.extend(hold.plans.iter().map(own_plan));
+    lines
+}
+
+fn own_plan(plan: &OwnPlanReport) -> String {
+    let OwnPlanReport { label, why, .. } = plan;
+    let how = match (&plan.rejected, plan.duration_s) {
+        (Some(rejected), _) => format!("not feasible, {rejected}"),
+        (None, Some(duration_s)) => format!("{duration_s:.3} s"),
+        (None, None) => "no motion".to_owned(),
+    };
+    let mut lost: Vec<(f64, &str, f64)> = plan
+        .clearances
+        .iter()
+        .filter_map(|(class, found)| Some((found.lost_m()?, *class, found.time_s)))
+        .collect();
+    lost.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let compared = match (plan.rejected.is_some(), lost.first()) {
+        (true, _) => String::new(),
+        (false, Some((lost_m, class, time_s))) if *lost_m > 0.0 => format!(
+            "; the motion loses up to {:.1} mm of clearance: {class} at t = {time_s:.3} s",
+            lost_m * 1e3
+        ),
+        (false, _) => "; the motion loses no clearance".to_owned(),
+    };
+    format!("own plan, {why}, {label}: {how}{compared}")
+}
+
+/// Clearances of the motion beside those of the plans.
+fn table(hold: &HoldReport) -> Option<Block> {
+    let first = hold.plans.first()?;
+    let mut header = vec![
+        "least clearance".to_owned(),
+        "motion\n(mm)".to_owned(),
+        "at (s)".to_owned(),
+        "<between".to_owned(),
+    ];
+    header.extend(
+        hold.plans
+            .iter()
+            .map(|plan| format!("{}\nplan (mm)", plan.label)),
+    );
+    let rows = first.clearances.iter().map(|(class, found)| {
+        let mut row = vec![
+            (*class).to_owned(),
+            format!("{:.1}", found.motion_m * 1e3),
+            format!("{:.3}", found.time_s),
+            pair_in_words(&found.pair),
+        ];
+        row.extend(hold.plans.iter().map(|plan| {
+            let found = plan.clearances.get(class);
+            found.map_or("-".to_owned(), |found| format!("{:.1}", found.plan_m * 1e3))
+        }));
+        row
+    });
+    let rows: Vec<Vec<String>> = rows.collect();
+    (!rows.is_empty()).then_some(Block::Table { header, rows })
+}
+
+fn peak(peak: &PeakReport) -> String {
+    let angular = |value: f64| format!("{:.1}", value.to_degrees());
+    let (what, value, limit, unit) = match peak.criterion {
+        "joint_range" => ("position", angular(peak.value), angular(peak.limit), "deg"),
+        "joint_speed" => (
+            "speed",
+            angular(peak.value.abs()),
+            angular(peak.limit),
+            "deg/s",
+        ),
+        "joint_acceleration" => (
+            "acceleration",
+            angular(peak.value.abs()),
+            angular(peak.limit),
+            "deg/s^2",
+        ),
+        _ => (
+            "torque",
+            format!("{:.1}", peak.value.abs()),
+            format!("{:.1}", peak.limit),
+            "N m",
+        ),
+    };
+    format!(
+        "{what} {value} of {limit} {unit} ({} at {:.3} s)",
+        peak.joint, peak.time_s
+    )
+}
+
+fn degrees(angle_rad: f64, decimals: usize) -> String {
+    // Not "-0".
+    format!("{:.decimals$} deg", angle_rad.to_degrees() + 0.0)
+}
+
+fn millimetres(length_m: f64) -> String {
+    format!("{:.3}", length_m * 1e3)
+}
