@@ -85,6 +85,8 @@ struct Hold {
     configuration: Configuration,
     /// The points of its standstill.
     points: Range<usize>,
+    /// Those of standstills at the same goal before it, between which the motion is at no other goal.
+    earlier: Vec<Range<usize>>,
 }
 
 /// Judges a motion: at which goals it holds and in which configuration, how far the guide is off, its clearances
@@ -232,6 +234,7 @@ fn holds(
             configuration: configuration(planner.kinematics(), &held),
             held,
             points: place.clone(),
+            earlier: Vec::new(),
         }
     };
     // How far off in units of what is still at the goal.
@@ -287,20 +290,24 @@ fn holds(
             .key("--goal")
             .hint(hint));
     }
-    for (index, hold) in at_goals.iter().enumerate() {
-        let before = at_goals[..index].iter().find(|each| each.goal == hold.goal);
-        if let Some(before) = before {
+    let mut found: Vec<Hold> = Vec::new();
+    for mut hold in at_goals {
+        if let Some(before) = found.pop_if(|before| before.goal == hold.goal) {
+            hold.earlier = before.earlier;
+            hold.earlier.push(before.points);
+        } else if let Some(before) = found.iter().find(|before| before.goal == hold.goal) {
             let message = format!(
-                "the motion holds at goal `{}` twice, at {:.3} s and at {:.3} s",
+                "the motion comes back to goal `{}`, which it held at {:.3} s, from another (t = {:.3} s)",
                 resolved.goals[hold.goal].name,
                 course.times_s[before.points.start],
                 course.times_s[hold.points.start]
             );
-            let hint = "judge one of them by itself: cut the file, or name the goal with --goal";
+            let hint = "judge what follows by itself: cut the file, or name the goal with --goal";
             return Err(course.finding(hold.points.start, message).hint(hint));
         }
+        found.push(hold);
     }
-    Ok(at_goals)
+    Ok(found)
 }
 
 /// The configuration that a posture is nearest to; by its signs alone where the goal has no solution.
@@ -342,9 +349,12 @@ fn parts(resolved: &ResolvedScenario, course: &Course<'_>, holds: &[Hold]) -> Ve
     for (index, hold) in holds.iter().enumerate() {
         let is_last = index + 1 == holds.len();
         let (begins_s, stands_s) = (course.times_s[from], course.times_s[hold.points.start]);
-        let mut trajectory = course.part(Phase::Travel, from..hold.points.start);
-        if !hold.points.is_empty() {
-            trajectory = trajectory.followed_by(course.part(Phase::Hold, hold.points.clone()));
+        let mut trajectory = JointTrajectory::starting_at(*course.position(from));
+        let mut at = from;
+        for stand in hold.earlier.iter().chain([&hold.points]) {
+            trajectory = trajectory.followed_by(course.part(Phase::Travel, at..stand.start));
+            trajectory = trajectory.followed_by(course.part(Phase::Hold, stand.clone()));
+            at = stand.end;
         }
         let mut ends_s = course.times_s[hold.points.end];
         // Where the motion ends the arm stands on.

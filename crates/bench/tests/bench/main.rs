@@ -2,6 +2,7 @@
 
 mod directed;
 mod further_engine;
+mod judge;
 #[path = "../../../engine/tests/engine/common/replay.rs"]
 mod replay;
 mod routes;

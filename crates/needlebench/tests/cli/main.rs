@@ -31,6 +31,7 @@ mod init;
 #[cfg(target_os = "linux")]
 mod interrupt;
 mod iso9283;
+mod judge;
 mod kinematics;
 mod log;
 mod made;

@@ -92,6 +92,12 @@ pub fn read_motion(path: &Path, options: &MotionOptions) -> Result<MotionFile, V
     if is_mcap(path) {
         return of_log::read(path, &file, options);
     }
+    let extension = path.extension().and_then(|extension| extension.to_str());
+    if let Some(kind @ ("script" | "urp" | "urscript")) = extension {
+        let message = format!("a motion is not read from a program (.{kind})");
+        let hint = "run the program in the controller's simulator, and judge its RTDE log: target_q is judged";
+        return Err(vec![Finding::new(&file, message).hint(hint)]);
+    }
     let text = read_data_text(path).map_err(|error| {
         let hint = error
             .hint("the path is relative to the working directory")

@@ -4,4 +4,5 @@ mod bad_logs;
 mod closed_loop;
 mod common;
 mod joint_states;
+mod motion_files;
 mod shipped_log;

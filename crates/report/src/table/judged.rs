@@ -6,6 +6,9 @@ use needlebench_evaluation::judged::{
 };
 use needlebench_show::Block;
 
+/// Classes of clearance that a sentence names.
+const MOST_NAMED: usize = 2;
+
 /// What is said of a judged motion: sentences, and a table of its clearances beside the plans'.
 pub fn judged_blocks(judged: &JudgedReport) -> Vec<Block> {
     let times = if judged.has_times {
@@ -75,19 +78,29 @@ fn own_plan(plan: &OwnPlanReport) -> String {
         (None, Some(duration_s)) => format!("{duration_s:.3} s"),
         (None, None) => "no motion".to_owned(),
     };
-    let mut lost: Vec<(f64, &str, f64)> = plan
+    // What has least left first: far from everything a loss is none.
+    let mut nearer: Vec<(f64, f64, &str)> = plan
         .clearances
         .iter()
-        .filter_map(|(class, found)| Some((found.lost_m()?, *class, found.time_s)))
+        .filter_map(|(class, found)| Some((found.motion_m, found.lost_m()?, *class)))
+        .filter(|(_, lost_m, _)| *lost_m > 0.0)
         .collect();
-    lost.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let compared = match (plan.rejected.is_some(), lost.first()) {
+    nearer.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let named = nearer
+        .iter()
+        .take(MOST_NAMED)
+        .map(|(left_m, lost_m, class)| {
+            format!(
+                "{class} by {:.1} mm, to {:.1} mm",
+                lost_m * 1e3,
+                left_m * 1e3
+            )
+        });
+    let named: Vec<String> = named.collect();
+    let compared = match (plan.rejected.is_some(), named.is_empty()) {
         (true, _) => String::new(),
-        (false, Some((lost_m, class, time_s))) if *lost_m > 0.0 => format!(
-            "; the motion loses up to {:.1} mm of clearance: {class} at t = {time_s:.3} s",
-            lost_m * 1e3
-        ),
-        (false, _) => "; the motion loses no clearance".to_owned(),
+        (false, true) => "; the motion comes no nearer to anything".to_owned(),
+        (false, false) => format!("; the motion comes nearer in {}", named.join("; ")),
     };
     format!("own plan, {why}, {label}: {how}{compared}")
 }
@@ -101,11 +114,15 @@ fn table(hold: &HoldReport) -> Option<Block> {
         "at (s)".to_owned(),
         "<between".to_owned(),
     ];
-    header.extend(
-        hold.plans
-            .iter()
-            .map(|plan| format!("{}\nplan (mm)", plan.label)),
-    );
+    // Their labels stand in the lines above.
+    header.extend(hold.plans.iter().map(|plan| {
+        let which = if plan.why == SAME_CONFIGURATION {
+            "same"
+        } else {
+            "best"
+        };
+        format!("{which}\nplan (mm)")
+    }));
     let rows = first.clearances.iter().map(|(class, found)| {
         let mut row = vec![
             (*class).to_owned(),

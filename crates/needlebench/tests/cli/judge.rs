@@ -1,0 +1,126 @@
+//! Motions from files, judged by the program: its own come back, foreign ones fail by name.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::support::{Bench, Json, workspace};
+
+/// A folder with the paper's scenario and a motion of straight joint-space lines.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    for path in ["scenarios/table3.toml", "guide/examples/straight_line.yaml"] {
+        let name = Path::new(path)
+            .file_name()
+            .unwrap()
+            .to_string_lossy()
+            .into_owned();
+        bench.write(&name, std::fs::read(workspace().join(path)).unwrap());
+    }
+    bench
+}
+
+const QUIET: &str = "--engine rapier --no-pictures --no-page --quiet --json";
+
+#[test]
+fn exported_motions_are_judged_as_the_plan_was() {
+    let bench = bench();
+    let run: Value = bench
+        .run(&format!("run table3.toml --out ran {QUIET}"))
+        .exits_with(0)
+        .json();
+    let label = run["goals"][0]["recommended"]["label"].word().to_owned();
+    let mut all = run["goals"][0]["configurations"].list().iter();
+    let planned = all.find(|each| each["label"] == label.as_str()).unwrap();
+    bench
+        .run("export table3.toml --as trajectory --json")
+        .exits_with(0);
+    for extension in ["json", "yaml", "csv"] {
+        let file = format!("out/table3/export/pose/{label}.trajectory.{extension}");
+        let answer: Value = bench
+            .run(&format!(
+                "judge table3.toml --motion {file} --out {extension} {QUIET}"
+            ))
+            .exits_with(0)
+            .json();
+        assert_eq!(answer["verdict"], run["verdict"]);
+        let judged = &answer["goals"][0]["configurations"][0];
+        assert_eq!(judged["label"], label.as_str());
+        for key in [
+            "clearance",
+            "tip_rms",
+            "self_clearance",
+            "corridor_clearance",
+        ] {
+            let [known, found] = [planned, judged].map(|each| each["metrics"][key].as_f64());
+            if let (Some(known), Some(found)) = (known, found) {
+                assert!(
+                    (known - found).abs() < 1e-3,
+                    "{extension} {key} {known} {found}"
+                );
+            }
+        }
+        let own = &answer["judged"]["holds"][0]["plans"][0];
+        assert_eq!(own["label"], label.as_str());
+        assert_eq!(answer["judged"]["holds"][0]["turns"].list().len(), 6);
+    }
+}
+
+#[test]
+fn a_corner_fails_by_name_and_every_result_is_written() {
+    let bench = bench();
+    let answer = bench.run(
+        "judge table3.toml --motion straight_line.yaml --engine rapier --no-pictures --quiet --junit junit.xml",
+    );
+    let answer = answer.exits_with(1);
+    let text = answer.stdout.as_str();
+    for said in [
+        "FAILED pose Right-Up-Fold joint_acceleration",
+        "between points straight joint-space",
+        "the hold of the scenario was added",
+        "own plan, same configuration, Right-Up-Fold",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    assert!(text.lines().filter(|line| line.contains("mm")).count() > 3);
+    let junit = bench.text("junit.xml");
+    assert!(junit.contains("joint_acceleration") && junit.contains("joint_speed"));
+    let page = bench.text("out/table3/report.html");
+    assert!(page.contains("straight_line.yaml"));
+}
+
+#[test]
+fn what_is_no_motion_of_this_scenario_is_refused() {
+    let bench = bench();
+    bench.write("moved.script", "movej([0,0,0,0,0,0])\n");
+    bench.write("deg.csv", "t,shoulder_pan_deg\n0,0\n");
+    for (arguments, said) in [
+        ("--motion nothing.json", "cannot read the motion"),
+        (
+            "--motion moved.script",
+            "a motion is not read from a program (.script)",
+        ),
+        ("--motion deg.csv", "is in degrees"),
+        (
+            "--motion straight_line.yaml --goal other",
+            "the scenario has no goal `other`",
+        ),
+        (
+            "--motion straight_line.yaml --between cubics",
+            "the points have no velocities",
+        ),
+        (
+            "--motion straight_line.yaml --stretch 2",
+            "--stretch is about logs",
+        ),
+        (
+            "--motion straight_line.yaml --of actual",
+            "--of is about logs",
+        ),
+    ] {
+        let answer = bench
+            .run(&format!("judge table3.toml {arguments}"))
+            .exits_with(2);
+        answer.complains([said]);
+    }
+}
