@@ -4,19 +4,10 @@ use needlebench_evaluation::metric::metrics;
 use needlebench_scenario::ResolvedScenario;
 use serde_json::{Map, Value, json};
 
-/// Classes of clearance, rules and criteria, besides those that are metrics.
-const NAMES: [(&str, &str); 31] = [
-    ("robot_phantom", "arm to patient"),
-    ("tool_phantom", "tool to patient"),
-    ("guide_standoff", "guide to skin"),
-    ("robot_table", "arm to table"),
-    ("robot_gantry", "arm to gantry"),
-    ("robot_mount", "arm to its mount"),
-    ("robot_obstacle", "arm to obstacles"),
-    ("robot_person", "arm to people"),
-    ("self", "self-clearance"),
-    ("needle_corridor", "access zone"),
-    ("needle_route", "needle path"),
+use crate::table::class_words::CLASSES;
+
+/// Rules and criteria, besides those that are metrics.
+const NAMES: [(&str, &str); 20] = [
     ("unreachable", "out of reach"),
     ("merged", "coincides with another configuration"),
     ("nearest_only", "reached only approximately"),
@@ -59,6 +50,7 @@ pub(super) fn words(resolved: &ResolvedScenario) -> Value {
     let criteria = metrics().filter_map(|metric| Some((metric.criterion?.key, metric.words)));
     // Of several ways to know one thing the last one is the plain one.
     let mut words: Map<String, Value> = criteria
+        .chain(CLASSES)
         .chain(NAMES)
         .map(|(name, words)| (name.to_owned(), json!(words)))
         .collect();

@@ -6,6 +6,8 @@ use needlebench_evaluation::judged::{
 };
 use needlebench_show::Block;
 
+use super::class_words::class_in_words;
+
 /// Classes of clearance that a sentence names.
 const MOST_NAMED: usize = 2;
 
@@ -60,7 +62,7 @@ fn lines(hold: &HoldReport) -> Vec<String> {
     if !hold.afterwards_m.is_empty() {
         let all = hold.afterwards_m.iter();
         let all: Vec<String> = all
-            .map(|(class, bound_m)| format!("{class} {:.1} mm", bound_m * 1e3))
+            .map(|(class, bound_m)| format!("{} {:.1} mm", class_in_words(class), bound_m * 1e3))
             .collect();
         lines.push(format!(
             "after the hold at least, certified: {}",
@@ -91,7 +93,8 @@ fn own_plan(plan: &OwnPlanReport) -> String {
         .take(MOST_NAMED)
         .map(|(left_m, lost_m, class)| {
             format!(
-                "{class} by {:.1} mm, to {:.1} mm",
+                "{} by {:.1} mm, to {:.1} mm",
+                class_in_words(class),
                 lost_m * 1e3,
                 left_m * 1e3
             )
@@ -125,7 +128,7 @@ fn table(hold: &HoldReport) -> Option<Block> {
     }));
     let rows = first.clearances.iter().map(|(class, found)| {
         let mut row = vec![
-            (*class).to_owned(),
+            class_in_words(class).to_owned(),
             format!("{:.1}", found.motion_m * 1e3),
             format!("{:.3}", found.time_s),
             pair_in_words(&found.pair),

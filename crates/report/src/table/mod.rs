@@ -2,6 +2,7 @@
 
 pub mod atlas;
 pub(crate) mod budget;
+pub(crate) mod class_words;
 pub mod comparison;
 pub(crate) mod engine_headings;
 pub(crate) mod events;

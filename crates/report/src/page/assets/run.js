@@ -440,7 +440,10 @@ class RunPage {
     this.drawPeople();
     this.sideTable();
     this.configurationTable();
-    NB.clear(this.answer, NB.sections.answer(this.goal, this.report.criteria, this.extra.trueTarget));
+    NB.clear(
+      this.answer,
+      NB.sections.answer(this.goal, this.report.criteria, this.extra.trueTarget, Boolean(this.page.judged)),
+    );
     NB.clear(this.people, NB.sections.people(this.goal));
     if (this.goalTable) NB.mark(this.goalTable.rows, index);
     const around = [

@@ -55,8 +55,8 @@ NB.certifiedAround = (page, clearances) => {
 
 NB.sections = /** @type {RunSections} */ (
   /** @type {Partial<RunSections>} */ ({
-    /** What to choose, and why, before all else. */
-    answer(goal, criteria, trueTarget) {
+    /** What to choose, and why, before all else; of a motion from a file there is nothing to choose. */
+    answer(goal, criteria, trueTarget, isJudged) {
       const { recommended } = goal;
       return [
         recommended
@@ -67,7 +67,9 @@ NB.sections = /** @type {RunSections} */ (
               recommended.reason.charAt(0).toUpperCase() + recommended.reason.slice(1),
               '.',
             )
-          : NB.el('p', { class: 'error', text: 'Recommended: none, no configuration is feasible.' }),
+          : isJudged
+            ? []
+            : NB.el('p', { class: 'error', text: 'Recommended: none, no configuration is feasible.' }),
         NB.sections.route(goal, criteria),
         trueTarget ? NB.el('p', { text: `${trueTarget.charAt(0).toUpperCase()}${trueTarget.slice(1)}.` }) : [],
       ];

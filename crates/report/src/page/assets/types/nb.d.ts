@@ -366,7 +366,7 @@ type RuleStyle = [color: string, hatch: number];
 
 /** Sections of the page of a run. */
 interface RunSections {
-  answer(goal: GoalReport, criteria: CriterionResult[], trueTarget: string | null): Child;
+  answer(goal: GoalReport, criteria: CriterionResult[], trueTarget: string | null, isJudged: boolean): Child;
   route(goal: GoalReport, criteria: CriterionResult[]): Child;
   goals(run: RunPage, choose: (index: number) => void): { element: HTMLElement; rows: HTMLElement[] } | null;
   margins(c: ConfigurationReport): Child;
