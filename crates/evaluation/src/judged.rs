@@ -41,7 +41,7 @@ pub struct HoldReport {
     pub is_added: bool,
     /// Roll of the guide about the needle, rad.
     pub roll_rad: f64,
-    /// Whole turns of each joint beyond `[-pi, pi]`.
+    /// 2π equivalent: full revolutions of each joint beyond `[-pi, pi]`.
     pub turns: Option<[i32; 6]>,
     /// Distance of the guide's exit from its planned place, m.
     pub guide_off_m: f64,

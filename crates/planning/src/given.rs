@@ -32,7 +32,7 @@ pub struct Held {
 pub struct Nearest {
     /// The solution, at the posture's roll, each joint in `[-pi, pi]`.
     pub solution: Solution,
-    /// Whole turns that bring it nearest to the posture.
+    /// Its 2π equivalent that is nearest to the posture, as full revolutions of each joint.
     pub turns: [i32; JOINT_COUNT],
     /// Largest difference of a joint from it then, rad.
     pub off_rad: f64,

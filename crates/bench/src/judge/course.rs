@@ -157,7 +157,7 @@ impl<'a> Course<'a> {
                         "{} jumps by {:.6} rad in {:.6} s: {speed_rad_s:.3} rad/s, where the joint can do {most_rad_s:.3}",
                         JOINT_NAMES[joint], step[joint], step_s
                     );
-                    let hint = "are points missing, or whole turns added?";
+                    let hint = "are points missing, or 2π added?";
                     let finding = self.finding(point, message).key(JOINT_NAMES[joint]);
                     return Err(finding.hint(hint));
                 }

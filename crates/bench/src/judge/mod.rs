@@ -44,7 +44,7 @@ pub struct JudgeOptions {
     pub beside: bool,
 }
 
-/// Why a motion is not judged.
+/// Why no verdict is given on a motion.
 #[derive(Debug, thiserror::Error)]
 pub enum JudgeError {
     /// The motion or the scenario is not fit for it.
@@ -208,7 +208,7 @@ fn begin(
         off_rad.to_degrees()
     );
     if any_start {
-        return Ok(Some(format!("{off}: the way there is not judged")));
+        return Ok(Some(format!("{off}: the way there is not evaluated")));
     }
     let hint =
         "judge it from where it begins with --start as-is, or set start.joints_deg in the scenario";

@@ -115,7 +115,7 @@ pub(crate) enum BetweenArgument {
 pub(crate) enum StartArgument {
     /// At the scenario's start posture, within 1 degree.
     Scenario,
-    /// Anywhere; the way there is not judged.
+    /// Anywhere; the way there is not evaluated.
     AsIs,
 }
 

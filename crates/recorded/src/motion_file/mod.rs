@@ -78,7 +78,7 @@ pub struct MotionOptions {
     pub topic: Option<String>,
 }
 
-/// No joint of a UR arm turns farther, rad: what is larger is in degrees. (Two whole turns would be refused by the range
+/// No joint of a UR arm turns farther, rad: what is larger is in degrees. (Two revolutions would be refused by the range
 /// of every joint.)
 const MOST_RAD: f64 = std::f64::consts::TAU + 1e-3;
 
@@ -192,7 +192,7 @@ impl Points {
         for (point, joints) in positions.iter().enumerate() {
             if let Some(joint) = joints.iter().position(|value| value.abs() > MOST_RAD) {
                 let name = JOINT_NAMES[joint];
-                let message = format!("{name} is {} rad, more than a whole turn", joints[joint]);
+                let message = format!("{name} is {} rad, more than a revolution", joints[joint]);
                 let hint = "joint positions are in radians; are these degrees?";
                 return Err(vec![at(point, message).key(name).hint(hint)]);
             }

@@ -39,7 +39,7 @@ fn lines(hold: &HoldReport) -> Vec<String> {
     let whole = hold
         .turns
         .filter(|turns| turns.iter().any(|turn| *turn != 0));
-    let whole = whole.map_or(String::new(), |turns| format!(", whole turns {turns:?}"));
+    let whole = whole.map_or(String::new(), |turns| format!(", 2π equivalent {turns:?}"));
     let which = match (hold.label, hold.joint_off_rad) {
         (Some(label), Some(off_rad)) => format!(
             "in {label}{whole}, joints within {} of its solution",
