@@ -30,6 +30,16 @@ pub struct NoOrientation(String);
 /// By axis of `ct`: the letters of its positive and negative direction.
 const LETTERS: [[char; 2]; 3] = [['L', 'R'], ['P', 'A'], ['S', 'I']];
 
+/// Every order of three axes, that of the axes themselves first.
+pub(crate) const PERMUTATIONS: [[usize; 3]; 6] = [
+    [0, 1, 2],
+    [1, 0, 2],
+    [0, 2, 1],
+    [2, 1, 0],
+    [1, 2, 0],
+    [2, 0, 1],
+];
+
 impl Orientation {
     /// Of i, j and k: the axis of `ct` along which it runs most, and 1 or -1 for its direction.
     pub fn axes(&self) -> [(usize, f64); 3] {
@@ -43,18 +53,10 @@ impl Orientation {
             let step: Vector3<f64> = steps.column(axis).into_owned();
             step / step.norm()
         }));
-        let permutations = [
-            [0, 1, 2],
-            [1, 0, 2],
-            [0, 2, 1],
-            [2, 1, 0],
-            [1, 2, 0],
-            [2, 0, 1],
-        ];
         let along =
             |rows: &[usize; 3]| -> f64 { (0..3).map(|axis| units[(rows[axis], axis)].abs()).sum() };
-        let mut best = permutations[0];
-        for rows in permutations {
+        let mut best = PERMUTATIONS[0];
+        for rows in PERMUTATIONS {
             // Of equals the first stays, up to rounding.
             if along(&rows) > along(&best) + 1e-9 {
                 best = rows;

@@ -77,17 +77,10 @@ fn ordered_grid(grid: &VoxelGrid, axes: [(usize, f64); 3]) -> Result<VoxelGrid, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::orientation::PERMUTATIONS;
 
     /// Every order of the axes, each way.
     fn orders() -> impl Iterator<Item = [(usize, f64); 3]> {
-        const PERMUTATIONS: [[usize; 3]; 6] = [
-            [0, 1, 2],
-            [0, 2, 1],
-            [1, 0, 2],
-            [1, 2, 0],
-            [2, 0, 1],
-            [2, 1, 0],
-        ];
         PERMUTATIONS.into_iter().flat_map(|rows| {
             (0..8_usize).map(move |flips| {
                 [0, 1, 2].map(|axis| (rows[axis], if flips >> axis & 1 == 1 { -1.0 } else { 1.0 }))

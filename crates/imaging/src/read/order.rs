@@ -1,6 +1,7 @@
 //! Label maps on the voxels of a CT whose axes run otherwise, or that have a part of them.
 
 use super::{ReadOptions, zeroed};
+use crate::orientation::PERMUTATIONS;
 use crate::{ImagingError, Remark, VoxelGrid};
 
 /// Distance between corners up to which two grids are the same.
@@ -18,16 +19,8 @@ pub(super) struct Order {
 
 impl Order {
     pub(super) fn between(own: &VoxelGrid, wanted: &VoxelGrid) -> Result<Self, ImagingError> {
-        let permutations = [
-            [0, 1, 2],
-            [1, 0, 2],
-            [0, 2, 1],
-            [2, 1, 0],
-            [1, 2, 0],
-            [2, 0, 1],
-        ];
         let mut nearest_m = f64::INFINITY;
-        for permutation in permutations {
+        for permutation in PERMUTATIONS {
             let size = permutation.map(|axis| own.size()[axis]);
             if (0..3).any(|axis| size[axis] > wanted.size()[axis]) {
                 continue;
