@@ -6,9 +6,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use needlebench_imaging::VoxelGrid;
 use needlebench_imaging::read::{ReadOptions, read_labels, read_volume};
 use needlebench_imaging::write::write_seg_nrrd;
-use needlebench_imaging::{ImagingError, VoxelGrid};
+use needlebench_programs_imaging::refused;
 use serde_json::{Value, json};
 
 fn main() {
@@ -32,12 +33,7 @@ fn answer(path: &Path, out: &Path, grid: &VoxelGrid, options: &ReadOptions) -> V
     let never = AtomicBool::new(false);
     let read = match read_labels(path, grid, options, &never) {
         Ok(read) => read,
-        Err(ImagingError::Interrupted) => return json!({"refused": "interrupted"}),
-        Err(ImagingError::Refused {
-            place,
-            message,
-            hint,
-        }) => return json!({"refused": message, "place": place, "hint": hint}),
+        Err(error) => return refused(error),
     };
     let labels = &read.labels.labels;
     let bytes: Vec<u8> = labels

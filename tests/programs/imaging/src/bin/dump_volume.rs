@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use needlebench_imaging::ImagingError;
 use needlebench_imaging::read::{ReadOptions, read_volume};
+use needlebench_programs_imaging::refused;
 use serde_json::{Value, json};
 
 fn main() {
@@ -51,12 +51,7 @@ fn answer(path: &Path, out: &Path, options: &ReadOptions, threads: usize) -> Val
     let (seconds, cpu_s) = (start.elapsed().as_secs_f64(), thread_cpu_s() - cpu_s);
     let read = match outcome {
         Ok(read) => read,
-        Err(ImagingError::Interrupted) => return json!({"refused": "interrupted"}),
-        Err(ImagingError::Refused {
-            place,
-            message,
-            hint,
-        }) => return json!({"refused": message, "place": place, "hint": hint}),
+        Err(error) => return refused(error),
     };
     let grid = &read.volume.grid;
     let steps: Vec<f64> = grid.steps_m().iter().copied().collect();
