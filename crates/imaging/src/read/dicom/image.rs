@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 
@@ -43,6 +44,8 @@ pub(super) struct ImageFile {
     pub(super) padding: Option<[f64; 2]>,
     pub(super) assumed: Option<&'static str>,
     pub(super) is_lossy: bool,
+    /// Whether the stream of a frame that was decoded says that its numbers differ from the measured ones.
+    pub(super) has_lossy_stream: AtomicBool,
     /// Whether the compression leaves it open, and the file says nothing.
     pub(super) may_be_lossy: bool,
     /// Text of (0018,1120): for information only, its sign differs between manufacturers.
@@ -302,6 +305,7 @@ pub(super) fn slices(
         stored,
         padding: padding(&data, is_signed),
         assumed,
+        has_lossy_stream: AtomicBool::new(false),
         is_lossy: syntax.is_lossy() || lossy.as_deref() == Some("01"),
         may_be_lossy: syntax.may_be_lossy() && lossy.is_none(),
         gantry_tilt: data.real(tag::GANTRY_TILT).ok().flatten(),

@@ -331,8 +331,18 @@ impl<'a> Bits<'a> {
     }
 }
 
-/// Values of a stream, row by row.
-pub(super) fn decode(bytes: &[u8], [columns, rows]: [usize; 2]) -> Result<Vec<u16>, &'static str> {
+/// What is in front of the bits of a stream.
+struct Head<'a> {
+    /// Bits of a value; columns and rows.
+    frame: Option<(u8, [usize; 2])>,
+    stated: Stated,
+    /// The header of the scan.
+    scan: &'a [u8],
+    /// What follows it.
+    rest: &'a [u8],
+}
+
+fn head_of(bytes: &[u8]) -> Result<Head<'_>, &'static str> {
     let mut rest = bytes
         .strip_prefix(&[0xFF, START])
         .ok_or("they have an invalid beginning")?;
@@ -352,17 +362,34 @@ pub(super) fn decode(bytes: &[u8], [columns, rows]: [usize; 2]) -> Result<Vec<u1
                 return Err("they have restart intervals, which are not supported");
             }
             SCAN => {
-                let (bits, size) = frame.ok_or("they have no frame header")?;
-                if size != [columns, rows] {
-                    return Err("they have another size than the file states");
-                }
-                let parameters = Parameters::new(bits, near_of(segment)?, stated)?;
-                return Scan::new(parameters, rest).all(columns, rows);
+                return Ok(Head {
+                    frame,
+                    stated,
+                    scan: segment,
+                    rest,
+                });
             }
             END => return Err("they have no scan"),
             _ => {}
         }
     }
+}
+
+/// Values of a stream, row by row.
+pub(super) fn decode(bytes: &[u8], [columns, rows]: [usize; 2]) -> Result<Vec<u16>, &'static str> {
+    let head = head_of(bytes)?;
+    let (bits, size) = head.frame.ok_or("they have no frame header")?;
+    if size != [columns, rows] {
+        return Err("they have another size than the file states");
+    }
+    let parameters = Parameters::new(bits, near_of(head.scan)?, head.stated)?;
+    Scan::new(parameters, head.rest).all(columns, rows)
+}
+
+/// Whether the values of a stream may differ from those that were compressed: its NEAR is not 0. A stream that says
+/// nothing of it is none that can be decoded.
+pub(super) fn is_lossy(bytes: &[u8]) -> bool {
+    head_of(bytes).is_ok_and(|head| near_of(head.scan).is_ok_and(|near| near != 0))
 }
 
 /// Bits of a value; columns and rows.
@@ -623,6 +650,7 @@ mod tests {
                 .zip(&expected)
                 .map(|(a, b)| (i32::from(*a) - b).abs());
             assert_eq!(errors.max(), Some(near));
+            assert_eq!(is_lossy(&encoded(hex)), near > 0);
         }
     }
 

@@ -125,6 +125,7 @@ pub(super) fn read(
     )?;
     pixels::check(&stack.slices)?;
     let (hu, tally) = pixels::hu(&stack.slices, &stack.sources, options, threads, cancel)?;
+    remarks.extend(loss_remarks(&stack.slices));
     let description = description(&stack, label, tally.padding);
     let volume = Volume {
         grid: stack.grid,
@@ -294,15 +295,40 @@ fn collect(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), 
     Ok(())
 }
 
+/// The first slice of some, and how many they are.
+fn first_with<'s>(
+    slices: &'s [Slice],
+    is_odd: &dyn Fn(&Slice) -> bool,
+) -> Option<(&'s Slice, usize)> {
+    let odd = slices.iter().filter(|slice| is_odd(slice));
+    let count = odd.clone().count();
+    odd.into_iter().next().map(|slice| (slice, count))
+}
+
+/// Whether pixels were compressed with loss, as headers and the streams of decoded pixels say it.
+fn loss_remarks(slices: &[Slice]) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    let is_lossy =
+        |slice: &Slice| slice.file.is_lossy || slice.file.has_lossy_stream.load(Ordering::Relaxed);
+    if let Some((slice, count)) = first_with(slices, &is_lossy) {
+        let message =
+            format!("{count} slices were compressed with loss: HU differ from the measured ones");
+        remarks.push(Remark::new(message).at(&*slice.file.name));
+    }
+    if let Some((slice, count)) = first_with(slices, &|slice| slice.file.may_be_lossy) {
+        let message = format!(
+            "{count} slices may have been compressed with loss: their compression allows it, and \
+             the file does not state it"
+        );
+        remarks.push(Remark::new(message).at(&*slice.file.name));
+    }
+    remarks
+}
+
 /// What is odd in the headers of slices.
 fn header_remarks(stack: &Stack) -> Vec<Remark> {
-    let slices = &stack.slices;
     let mut remarks = Vec::new();
-    let first_with = |is_odd: &dyn Fn(&Slice) -> bool| {
-        let odd = slices.iter().filter(|slice| is_odd(slice));
-        let count = odd.clone().count();
-        odd.into_iter().next().map(|slice| (slice, count))
-    };
+    let first_with = |is_odd: &dyn Fn(&Slice) -> bool| first_with(&stack.slices, is_odd);
     if let Some((slice, _)) = first_with(&|slice| slice.file.assumed.is_some()) {
         remarks.push(Remark::new(slice.file.assumed.unwrap_or_default()).at(&*slice.file.name));
     }
@@ -316,18 +342,6 @@ fn header_remarks(stack: &Stack) -> Vec<Remark> {
         let kind = slice.rescale_type.as_deref().unwrap_or_default();
         remarks
             .push(Remark::new(format!("the stated unit is {kind}, not HU")).at(&*slice.file.name));
-    }
-    if let Some((slice, count)) = first_with(&|slice| slice.file.is_lossy) {
-        let message =
-            format!("{count} slices were compressed with loss: HU differ from the measured ones");
-        remarks.push(Remark::new(message).at(&*slice.file.name));
-    }
-    if let Some((slice, count)) = first_with(&|slice| slice.file.may_be_lossy) {
-        let message = format!(
-            "{count} slices may have been compressed with loss: their compression allows it, and \
-             the file does not state it"
-        );
-        remarks.push(Remark::new(message).at(&*slice.file.name));
     }
     let has_wrong_padding =
         |slice: &Slice| slice.file.padding.is_some() && pixels::applicable_padding(slice).is_none();
@@ -346,7 +360,7 @@ fn header_remarks(stack: &Stack) -> Vec<Remark> {
         remarks.push(Remark::new(message).at(&*slice.file.name));
     }
     remarks.extend(overlapping(stack));
-    remarks.extend(varying_rescale(slices));
+    remarks.extend(varying_rescale(&stack.slices));
     remarks.extend(tilt(stack));
     remarks
 }

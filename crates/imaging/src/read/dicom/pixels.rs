@@ -190,6 +190,9 @@ fn read_frame(
                 last.append(image, options, *at, *bytes, buffer)?;
             }
             let bits = u16::try_from(stored.kind.bytes() * 8).unwrap_or(0);
+            if image.syntax.is_lossy_stream(buffer) {
+                image.has_lossy_stream.store(true, Ordering::Relaxed);
+            }
             let used = stored.bits.and_then(|(used, _)| u16::try_from(used).ok());
             *buffer = image.syntax.decode(&Compressed {
                 bytes: buffer,

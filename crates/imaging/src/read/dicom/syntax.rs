@@ -35,14 +35,10 @@ const JPEG_2000: [&str; 5] = [
     "1.2.840.10008.1.2.4.202",
     "1.2.840.10008.1.2.4.203",
 ];
-/// JPEG-LS, lossless and nearly.
+/// JPEG-LS. Which of the two it is does not say whether there is a loss: each stream does.
 const JPEG_LS: [&str; 2] = ["1.2.840.10008.1.2.4.80", "1.2.840.10008.1.2.4.81"];
 /// Whose numbers are not those that were measured.
-const ALWAYS_LOSSY: [&str; 3] = [
-    "1.2.840.10008.1.2.4.50",
-    "1.2.840.10008.1.2.4.51",
-    "1.2.840.10008.1.2.4.81",
-];
+const ALWAYS_LOSSY: [&str; 2] = ["1.2.840.10008.1.2.4.50", "1.2.840.10008.1.2.4.51"];
 /// Which may be either: JPEG 2000 and its kind of high throughput.
 const MAYBE_LOSSY: [&str; 2] = ["1.2.840.10008.1.2.4.91", "1.2.840.10008.1.2.4.203"];
 
@@ -96,6 +92,11 @@ impl TransferSyntax {
 
     pub(super) fn is_lossy(&self) -> bool {
         ALWAYS_LOSSY.contains(&self.uid.as_str())
+    }
+
+    /// Whether the stream of a frame says that its numbers are not those that were compressed.
+    pub(super) fn is_lossy_stream(&self, bytes: &[u8]) -> bool {
+        JPEG_LS.contains(&self.uid.as_str()) && jpeg_ls::is_lossy(bytes)
     }
 
     /// Whether pixels may be lossy where a file does not say that they are not.
