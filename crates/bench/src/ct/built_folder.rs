@@ -6,14 +6,15 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{Point3, Vector3};
 use needlebench_imaging::read::{ReadOptions, read_label_names, read_labels, read_volume};
 use needlebench_imaging::registration::{ReferenceFrame, Registration};
-use needlebench_imaging::{ImagingError, LabelMap, Volume, VoxelGrid};
+use needlebench_imaging::{ImagingError, LabelMap, SurfaceTissue, Volume, VoxelGrid};
 use needlebench_input::{Finding, read_text, sha256_hex};
-use needlebench_scenario::scenario::Scenario;
+use needlebench_scenario::scenario::{LengthUnit, Scenario};
 use serde::Deserialize;
 
 use super::digest::voxels_sha256;
 use super::files::{LABELS_FILE, NAMES_FILE, REPORT_FILE, VOLUME_FILE};
 use super::overview::OverviewRow;
+use super::patient::is_under;
 use crate::Stop;
 
 /// Farthest that a corner of the volume may be from where the report has it, m: a file has single precision.
@@ -21,7 +22,7 @@ const SAME_PLACE_M: f64 = 1e-5;
 /// The version of `report.json` that is read.
 const VERSION: u32 = 1;
 /// What to do about a folder that was not built, or not for this.
-const BUILD: &str = "create such a folder with `needlebench ct build SCAN --out DIR`";
+pub(super) const BUILD: &str = "create such a folder with `needlebench ct build SCAN --out DIR`";
 const BUILD_ANEW: &str = "volume, labels, surfaces and scenario must come from one `needlebench ct build`; rebuild the \
      folder";
 
@@ -32,10 +33,10 @@ pub struct BuildFacts {
     /// Of the report itself.
     #[serde(skip)]
     sha256: String,
-    size: [usize; 3],
-    spacing_m: [f64; 3],
+    pub(super) size: [usize; 3],
+    pub(super) spacing_m: [f64; 3],
     first_voxel_m: [f64; 3],
-    phantom_origin_m: [f64; 3],
+    pub(super) phantom_origin_m: [f64; 3],
     #[serde(default)]
     voxels_sha256: Option<String>,
     #[serde(default)]
@@ -67,6 +68,9 @@ impl BuildFacts {
 pub struct SurfaceFacts {
     /// Its name, as in `[[phantom.parts]]`.
     pub name: String,
+    /// What it is of; none in reports of former versions.
+    #[serde(default)]
+    tissue: Option<SurfaceTissue>,
     file: String,
     triangles: u64,
     /// From the surface of the voxels to this one.
@@ -270,35 +274,55 @@ impl BuiltFolder {
     /// # Errors
     /// What it lacks, or has elsewhere.
     pub fn check_scenario(&self, file: &str, scenario: &Scenario) -> Result<(), Stop> {
-        let other = |message: String| {
-            let finding = Finding::new(file, message);
-            Stop::from(finding.key("phantom.parts").hint(BUILD_ANEW))
-        };
-        let build = scenario.phantom.as_ref().and_then(|it| it.build.as_ref());
-        if build.is_some_and(|build| build.sha256 != self.facts.sha256) {
-            return Err(other(format!("not of the build of {REPORT_FILE}")));
-        }
-        let parts = scenario.phantom.as_ref().map(|it| &it.parts[..]);
-        for surface in &self.facts.surfaces {
-            let mut parts = parts.unwrap_or_default().iter();
-            let Some(part) = parts.find(|it| it.name == surface.name && it.file == surface.file)
-            else {
-                return Err(other(format!(
-                    "no part `{}` of the file {}, which {REPORT_FILE} has",
-                    surface.name, surface.file
-                )));
-            };
-            let off_m = (Vector3::from(part.position_mm) * 1e-3 + self.origin_in_ct_m()).norm();
-            if off_m > SAME_PLACE_M {
-                return Err(other(format!(
-                    "part `{}` is {:.2} mm from its position in {REPORT_FILE}",
-                    part.name,
-                    off_m * 1e3
-                )));
-            }
-        }
-        Ok(())
+        check_patient(&self.facts, file, scenario).map_err(Stop::from)
     }
+}
+
+/// Whether the patient of a scenario is that of the report: of the same build, its surfaces where the report has them.
+pub(super) fn check_patient(
+    facts: &BuildFacts,
+    file: &str,
+    scenario: &Scenario,
+) -> Result<(), Finding> {
+    let other = |message: String| {
+        let finding = Finding::new(file, message);
+        finding.key("phantom.parts").hint(BUILD_ANEW)
+    };
+    let build = scenario.phantom.as_ref().and_then(|it| it.build.as_ref());
+    if build.is_some_and(|build| build.sha256 != facts.sha256) {
+        return Err(other(format!("not of the build of {REPORT_FILE}")));
+    }
+    let parts = scenario.phantom.as_ref().map(|it| &it.parts[..]);
+    for surface in &facts.surfaces {
+        let mut parts = parts.unwrap_or_default().iter();
+        let part = parts.find(|it| it.name == surface.name && it.file == surface.file);
+        if part.is_none() && surface.tissue.is_some_and(|it| is_under(it, &surface.name)) {
+            // Left out where the patient lies otherwise than in the scan.
+            continue;
+        }
+        let Some(part) = part else {
+            return Err(other(format!(
+                "no part `{}` of the file {}, which {REPORT_FILE} has",
+                surface.name, surface.file
+            )));
+        };
+        let off_m =
+            (Vector3::from(part.position_mm) * 1e-3 + Vector3::from(facts.phantom_origin_m)).norm();
+        if off_m > SAME_PLACE_M {
+            return Err(other(format!(
+                "part `{}` is {:.2} mm from its position in {REPORT_FILE}",
+                part.name,
+                off_m * 1e3
+            )));
+        }
+        if part.rpy_deg != [0.0; 3] || part.unit != LengthUnit::Mm {
+            return Err(other(format!(
+                "part `{}` is turned or in another unit than in {REPORT_FILE}",
+                part.name
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// The report at a path.

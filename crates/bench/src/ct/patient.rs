@@ -177,7 +177,8 @@ fn phantom(
     }
     let position_mm = frame.in_mm(&Point3::origin());
     let surfaces = build.seen.made.surfaces.iter();
-    let surfaces = surfaces.filter(|surface| !(is_couch_left_out && is_under(surface)));
+    let surfaces =
+        surfaces.filter(|surface| !(is_couch_left_out && is_under(surface.tissue, &surface.name)));
     let parts = surfaces.map(|surface| PartSection {
         name: surface.name.clone(),
         file: format!("{SURFACES}/{}.stl", surface.name),
@@ -228,9 +229,9 @@ fn phantom(
     }
 }
 
-/// Whether something beside the patient stays where it is when the patient is turned.
-fn is_under(surface: &Surface) -> bool {
-    surface.tissue == SurfaceTissue::Beside && surface.name != BesideKind::Arms.name()
+/// Whether a surface is of something beside the patient that stays where it is when the patient is turned.
+pub(super) fn is_under(tissue: SurfaceTissue, name: &str) -> bool {
+    tissue == SurfaceTissue::Beside && name != BesideKind::Arms.name()
 }
 
 /// Says that the patient of the room lies otherwise than on the couch of the scan, which is left out then.
@@ -253,10 +254,13 @@ pub(crate) fn couch_left_out(room: &Room<'_>, build: &ScanBuild) -> Option<Remar
         let [low, high] = extent_m(&surface.mesh);
         nalgebra::center(&low, &high)
     };
-    let placed = room.resolved.phantom.as_ref();
-    let down = placed.map_or(Vector3::y(), |placed| {
-        placed.world_from_phantom.rotation.inverse() * -Vector3::z()
-    });
+    // As the patient was laid, by the scan or by `--patient-position`: the room was resolved before.
+    let laid = room.scenario.phantom.as_ref();
+    let laid = laid.map_or_else(
+        || PhantomSection::default().orientation(),
+        PhantomSection::orientation,
+    );
+    let down = laid.inverse() * -Vector3::z();
     // The couch is as long as the scan: along the patient its middle says nothing.
     let mut to_couch = middle(couch) - middle(made.skin()?);
     to_couch.z = 0.0;

@@ -152,7 +152,7 @@ fn everything_is_in_the_overview(report: &serde_json::Value) {
 #[test]
 fn the_patient_lies_as_in_the_scan() {
     let bench = Bench::with_scenario(PRONE);
-    let synth = "ct synth s.toml --out ct --format dicom --pixels 96 --preset thick --no-labels";
+    let synth = "ct synth s.toml --out ct --format dicom --pixels 192 --preset thick --no-labels";
     bench.run(synth).exits_with(0);
     let said = bench.run("ct info ct/dicom").exits_with(0).stdout;
     holds(&said, ["prone, head first (HFP)"]);
@@ -163,6 +163,9 @@ fn the_patient_lies_as_in_the_scan() {
     };
     let said = built("").exits_with(0).stdout;
     holds(&said, ["lies prone as in the scan"]);
+    // On the couch that they lie on in the scan.
+    assert!(!said.contains(LEFT_OUT), "{said}");
+    holds(&bench.text("patient/scenario.toml"), ["name = \"couch\""]);
     holds(
         &bench.text("patient/scenario.toml"),
         ["posture = \"prone\""],
@@ -171,6 +174,16 @@ fn the_patient_lies_as_in_the_scan() {
         .exits_with(0)
         .stdout;
     holds(&said, ["--patient-position left-lateral is taken", "(HFP)"]);
+    holds(&said, [LEFT_OUT]);
+    assert!(
+        !bench
+            .text("patient/scenario.toml")
+            .contains("name = \"couch\"")
+    );
+    // The folder is whole without it.
+    let routes = "ct routes patient --target 70,0,100 --no-robot --directions 100 --no-pictures";
+    let found = bench.run(routes);
+    assert!(found.stdout.contains("routes.json"), "{}", found.stderr);
     holds(
         &bench.text("patient/scenario.toml"),
         ["posture = \"left-lateral\""],
@@ -185,6 +198,9 @@ fn the_patient_lies_as_in_the_scan() {
     holds(&said, ["the patient is turned"]);
     holds(&bench.text("patient/scenario.toml"), ["head_yaw_deg = 180"]);
 }
+
+/// What is said of a couch that is not under the patient.
+const LEFT_OUT: &str = "the couch of the scan is not under the patient";
 
 const PRONE: &str = r#"
 name = "prone"

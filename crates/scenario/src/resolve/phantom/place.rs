@@ -53,7 +53,7 @@ pub(crate) fn place_phantom(
 ) -> Result<PlacedPhantom, Finding> {
     let mut world_from_phantom = Pose::from_parts(
         Translation3::from(Vector3::from(section.position_mm) * 1e-3),
-        orientation(section),
+        section.orientation(),
     );
     let down = world_from_phantom.rotation.inverse() * -Vector3::z();
     // How far the skin reaches down.
@@ -164,21 +164,6 @@ fn check_over_table(
         .hint("move it over the table, or set `rest_on_table = false`"))
 }
 
-/// Orientation of the phantom (left, posterior, superior) in the world.
-fn orientation(section: &PhantomSection) -> UnitQuaternion<f64> {
-    let about = |axis: nalgebra::Unit<Vector3<f64>>, degrees: f64| {
-        UnitQuaternion::from_axis_angle(&axis, degrees.to_radians())
-    };
-    let (across, up) = (Vector3::y_axis(), Vector3::z_axis());
-    // What is nothing turns nothing, to the last bit.
-    let raised = if section.head_up_deg == 0.0 {
-        posture(section.posture)
-    } else {
-        about(across, -section.head_up_deg) * posture(section.posture)
-    };
-    about(up, section.head_yaw_deg) * raised * about(up, section.body_roll_deg)
-}
-
 /// How a posture lies with the head towards world x.
 fn posture(posture: Posture) -> UnitQuaternion<f64> {
     // Columns are where left, posterior and superior point.
@@ -195,6 +180,21 @@ fn posture(posture: Posture) -> UnitQuaternion<f64> {
 }
 
 impl PhantomSection {
+    /// Orientation of the phantom (left, posterior, superior) in the world.
+    pub fn orientation(&self) -> UnitQuaternion<f64> {
+        let about = |axis: nalgebra::Unit<Vector3<f64>>, degrees: f64| {
+            UnitQuaternion::from_axis_angle(&axis, degrees.to_radians())
+        };
+        let (across, up) = (Vector3::y_axis(), Vector3::z_axis());
+        // What is nothing turns nothing, to the last bit.
+        let raised = if self.head_up_deg == 0.0 {
+            posture(self.posture)
+        } else {
+            about(across, -self.head_up_deg) * posture(self.posture)
+        };
+        about(up, self.head_yaw_deg) * raised * about(up, self.body_roll_deg)
+    }
+
     /// Lays the phantom so that its frame is there in the world, whatever the table: in the posture that comes nearest, with
     /// the turns that are left. To rounding: 1e-6 mm and 1e-9 deg.
     pub fn set_pose(&mut self, world_from_phantom: &Pose) {
@@ -211,7 +211,7 @@ impl PhantomSection {
         self.head_yaw_deg = degrees(libm::atan2(head.y, head.x));
         self.head_up_deg = degrees(libm::atan2(head.z, libm::hypot(head.x, head.y)));
         self.body_roll_deg = 0.0;
-        let rest = orientation(self).inverse() * world_from_phantom.rotation;
+        let rest = self.orientation().inverse() * world_from_phantom.rotation;
         self.body_roll_deg = degrees(rest.scaled_axis().z);
         let place = world_from_phantom.translation.vector;
         self.position_mm = place.map(|metres| rounded(metres * 1e3, 1e6)).into();
@@ -235,16 +235,16 @@ mod tests {
                 posture,
                 ..PhantomSection::default()
             };
-            assert!((orientation(&section).inverse() * -Vector3::z() - down).norm() < 1e-12);
+            assert!((section.orientation().inverse() * -Vector3::z() - down).norm() < 1e-12);
             section.head_yaw_deg = 123.0;
             section.head_up_deg = 7.0;
             section.body_roll_deg = -11.0;
-            let wanted = Pose::from_parts(Translation3::new(0.1, -0.2, 0.9), orientation(&section));
+            let wanted = Pose::from_parts(Translation3::new(0.1, -0.2, 0.9), section.orientation());
             let mut set = PhantomSection::default();
             set.set_pose(&wanted);
             assert_eq!(set.posture, posture);
             assert!((set.head_up_deg - 7.0).abs() < 1e-8, "{set:?}");
-            assert!(orientation(&set).angle_to(&wanted.rotation) < 1e-10);
+            assert!(set.orientation().angle_to(&wanted.rotation) < 1e-10);
             assert_eq!(set.position_mm, [100.0, -200.0, 900.0]);
         }
     }
@@ -263,7 +263,7 @@ mod tests {
                 head_yaw_deg: 40.0,
                 ..PhantomSection::default()
             };
-            let head = orientation(&section) * Vector3::z();
+            let head = section.orientation() * Vector3::z();
             assert!((head.z - libm::sin(10_f64.to_radians())).abs() < 1e-12);
         }
     }
