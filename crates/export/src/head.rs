@@ -3,16 +3,25 @@
 use needlebench_bench::provenance::PROGRAM_VERSION;
 use needlebench_scenario::ResolvedScenario;
 
-/// Lines for the head of a file: which scenario, from which bytes, by which program, in which units,
-/// and what was assumed. No time and no path of this machine: the same scenario gives the same lines.
+/// Lines for the head of a file in the units and the world frame of the scenario: those of [`head_in`].
 pub(crate) fn head(resolved: &ResolvedScenario, what: &str) -> Vec<String> {
+    head_in(
+        resolved,
+        what,
+        "units: m, kg, s, rad, N m; z up; world frame of the scenario",
+    )
+}
+
+/// Lines for the head of a file: which scenario, from which bytes, by which program, in which `units` and frame, and
+/// what was assumed. No time and no path of this machine: the same scenario gives the same lines.
+pub(crate) fn head_in(resolved: &ResolvedScenario, what: &str, units: &str) -> Vec<String> {
     let robot = &resolved.robot_description;
     let mut lines = vec![
         format!("{what}, of the scenario {}", resolved.scenario.name),
         format!("scenario file: sha256 {}", resolved.source.sha256),
         format!("made by needlebench {PROGRAM_VERSION}"),
         format!("arm: {}, tool: {}", robot.arm_name, resolved.cell.tool.name),
-        "units: m, kg, s, rad, N m; z up; world frame of the scenario".to_owned(),
+        units.to_owned(),
     ];
     if resolved.imperfections.is_some() {
         lines.push("nominal cell, without the imperfections sampled in the scenario".to_owned());

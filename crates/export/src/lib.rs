@@ -1,5 +1,6 @@
 //! What a scenario says, in the formats of other tools: the whole cell as a model of a simulator, a
-//! robot description or a picture in space; its motions as recordings, trajectories and programs.
+//! robot description or a picture in space; its motions as recordings, trajectories and programs; its
+//! needles as markups over the scan.
 //!
 //! One public function for each format, which gives [`ExportedFile`]s. Nothing here prints or writes.
 //! Joints and links have the names that ROS gives them. The same scenario gives the same bytes.
@@ -10,6 +11,7 @@ mod file;
 mod gltf;
 mod head;
 mod marks;
+mod markups;
 mod mcap;
 mod mjcf;
 mod motion;
@@ -23,6 +25,7 @@ mod urscript;
 pub use error::ExportError;
 pub use file::ExportedFile;
 pub use gltf::{Packing, Shown, gltf};
+pub use markups::markups;
 pub use mcap::mcap;
 pub use mjcf::mjcf;
 pub use motion::Motion;

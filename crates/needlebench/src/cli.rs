@@ -81,7 +81,7 @@ enum Command {
     )]
     Atlas(AtlasArguments),
     /// Export a scenario to another tool: the whole cell for MuJoCo, for ROS or as glTF; one of its motions for ROS 2
-    /// or for a controller.
+    /// or for a controller; its needles for 3D Slicer.
     #[command(after_help = "Example: needlebench export scenarios/table3.toml --as mjcf")]
     Export(Box<ExportArguments>),
     /// Compare two results; fail on regressions beyond given thresholds.

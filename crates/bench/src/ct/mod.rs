@@ -6,6 +6,7 @@ mod built_folder;
 mod digest;
 mod files;
 mod imaged;
+mod needles;
 mod overview;
 mod patient;
 mod scan_order;
@@ -28,6 +29,7 @@ pub use files::{
     BuildFiles, BuildReport, ROUTES_FILE, SCENARIO_FILE, SESSION_FILE, SLICES, VOLUME_FILE,
 };
 pub use imaged::{Imaged, LastScan, imaged, scanned};
+pub use needles::{ScanNeedle, ScanNeedles};
 pub use overview::{OverviewAccuracy, OverviewRow, OverviewSource, unlabelled};
 pub use patient::{PatientFrame, Room};
 pub use scan_order::{CtSubject, ScanOrder, ScanRange, SyntheticScan};

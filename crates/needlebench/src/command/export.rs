@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use needlebench_export::{ExportError, ExportedFile, Packing, Shown, gltf, mjcf, urdf};
+use needlebench_bench::ct::ScanNeedles;
+use needlebench_export::{ExportError, ExportedFile, Packing, Shown, gltf, markups, mjcf, urdf};
 use needlebench_input::{Finding, nearest_name, sha256_hex};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
@@ -72,6 +73,8 @@ pub(crate) enum Format {
     Urdf,
     /// The whole cell in a posture as a 3D scene, for Blender, slides and viewers: binary glTF.
     Gltf,
+    /// Entry and target of each goal as markups of 3D Slicer over the scan, for a patient of `ct build`.
+    Markups,
 }
 
 /// Properties of a format.
@@ -131,6 +134,13 @@ impl Format {
                 motion: false,
                 recording: false,
             },
+            Self::Markups => Traits {
+                extension: "mrk.json",
+                what: "the needles as markups of 3D Slicer, in the coordinates of the scan",
+                posture: false,
+                motion: false,
+                recording: false,
+            },
         }
     }
 
@@ -187,6 +197,7 @@ impl Wanted<'_> {
             Format::Mcap | Format::Trajectory | Format::Urscript => {
                 unreachable!("motions are exported after a run")
             }
+            Format::Markups => unreachable!("needles are placed in the scan first"),
             Format::Urdf => urdf(self.resolved, self.stem),
             Format::Gltf => gltf(self.resolved, self.stem, &self.shown(), self.packing),
         }
@@ -203,6 +214,7 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus, Failure>
     }
     let chosen = chosen(arguments, &resolved)?;
     let joints = joints(arguments, &resolved)?;
+    let scan = needles(arguments, &resolved)?;
     let (folder, stem, extension) = place(arguments, &resolved)?;
     prepare_folder(&folder)?;
     let wanted = Wanted {
@@ -216,9 +228,12 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus, Failure>
         chosen,
         joints,
     };
-    let mut files = wanted
-        .files(arguments.format)
-        .map_err(|error| Finding::new(&resolved.source.file, error.to_string()))?;
+    let mut files = match &scan {
+        Some(scan) => markups(&resolved, scan, &stem),
+        None => wanted
+            .files(arguments.format)
+            .map_err(|error| Finding::new(&resolved.source.file, error.to_string()))?,
+    };
     if let Some((first, others)) = files.split_first_mut() {
         first.name = format!("{stem}{extension}");
         if others.iter().any(|other| other.name == first.name) {
@@ -230,6 +245,20 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus, Failure>
         }
     }
     finish(arguments, &resolved, &folder, &files)
+}
+
+/// The needles in the coordinates of the scan, for the format that has them.
+fn needles(
+    arguments: &ExportArguments,
+    resolved: &ResolvedScenario,
+) -> Result<Option<ScanNeedles>, Failure> {
+    if arguments.format != Format::Markups {
+        return Ok(None);
+    }
+    let folder = arguments.scenario.parent().unwrap_or(Path::new(""));
+    ScanNeedles::of(resolved, folder)
+        .map(Some)
+        .map_err(|stop| Failure::of_stop(stop, "interrupted"))
 }
 
 /// Writes and lists the files.

@@ -3,7 +3,7 @@
 use std::fs;
 use std::sync::OnceLock;
 
-use crate::support::{Bench, Json, has_keys, holds, numbers, workspace};
+use crate::support::{Bench, Json, has_keys, holds, numbers, with_edit, workspace};
 
 /// A chest of coarse pixels with markers that the robot has touched, and the patient made of it.
 fn built() -> &'static Bench {
@@ -15,10 +15,10 @@ fn build() -> Bench {
     let text = fs::read_to_string(workspace().join("scenarios/supine_suite.toml")).unwrap();
     let bench = Bench::shared();
     bench.write("s.toml", text);
-    let scan =
-        "ct synth s.toml --out ct --markers ct-sphere --pixels 300 --preset biopsy --no-labels";
+    let scan = "ct synth s.toml --out ct --markers ct-sphere --pixels 300 --preset biopsy --no-labels \
+         --shift-mm 10,-20,-300";
     bench.run(scan).exits_with(0);
-    let build = "ct build ct/ct.nii.gz --out patient --lesion nodule=-107,10,35 --thickness-mm 2.5 \
+    let build = "ct build ct/ct.nii.gz --out patient --lesion nodule=-97,-10,-265 --thickness-mm 2.5 \
                  --markers ct/marker_list.toml --room s.toml --no-pictures";
     bench.run(build).exits_with(0);
     bench
@@ -106,6 +106,82 @@ fn routes_in_a_scan_are_planned_with_the_robot_written_and_checked() {
     assert_eq!(entry.len(), 3);
 }
 
+/// Markups are where the paths are in the scan, though the robot is registered and the patient lies elsewhere.
+#[test]
+fn needles_become_markups_in_the_coordinates_of_the_scan() {
+    let bench = built();
+    let plan =
+        "ct routes patient --directions 3000 --no-robot --write patient/markups.toml --out routes";
+    let found = bench.run(format!("{plan} --json")).exits_with(0).json();
+    let plan = &found["targets"][0];
+    let chosen = plan["chosen"]["route"].as_u64().unwrap();
+    let route = &plan["routes"][usize::try_from(chosen).unwrap()];
+    let origin = numbers(&plan["phantom_origin_in_ct_m"]);
+    assert!(origin.iter().any(|each| each.abs() > 1e-3));
+    let in_scan_mm = |place: &serde_json::Value| {
+        let place = numbers(place).into_iter().zip(&origin);
+        place
+            .map(|(phantom_m, origin_m)| 1e3 * (phantom_m + origin_m))
+            .collect::<Vec<_>>()
+    };
+    let file = "slicer/needles.mrk.json";
+    let export = |scenario: &str| bench.run(format!("export {scenario} --as markups --out {file}"));
+    export("patient/markups.toml").exits_with(0).says([file]);
+    let document = bench.read_json(file);
+    let [line, entries, targets] = &document["markups"].list()[..] else {
+        panic!("{document}")
+    };
+    let is_at = |point: &serde_json::Value, wanted: &[f64]| {
+        let position = numbers(&point["position"]);
+        let mut pairs = position.iter().zip(wanted);
+        // The skin of the voxels, and its surface.
+        assert!(
+            pairs.all(|(a, b)| (a - b).abs() < 0.5),
+            "{point} {wanted:?}"
+        );
+    };
+    let entry = in_scan_mm(&route["entry_in_phantom_m"]);
+    let target = in_scan_mm(&plan["target_in_phantom_m"]);
+    assert_eq!(line["name"], "nodule");
+    assert_eq!(line["coordinateSystem"], "LPS");
+    assert_eq!(line["coordinateUnits"], "mm");
+    is_at(&line["controlPoints"][0], &entry);
+    is_at(&line["controlPoints"][1], &target);
+    is_at(&entries["controlPoints"][0], &entry);
+    is_at(&targets["controlPoints"][0], &target);
+    // A tip that ends elsewhere is said at the target.
+    let text = bench.text("patient/markups.toml");
+    let shorter = with_edit(
+        &text,
+        "[[goals]]\n",
+        "[[goals]]\ninsertion_length_mm = 40\n",
+    );
+    bench.write("patient/shorter.toml", shorter);
+    export("patient/shorter.toml").exits_with(0);
+    let point = bench.read_json(file)["markups"][0]["controlPoints"][1].clone();
+    is_at(&point, &target);
+    holds(
+        point["description"].word(),
+        ["the planned needle tip ends ", " mm before it"],
+    );
+    // Where surfaces are elsewhere or turned, so is the patient: these are no coordinates of the scan.
+    let at = "name = \"skin\"\nposition_mm = [";
+    let from = text.find(at).unwrap() + at.len();
+    let first = &text[from..from + text[from..].find(',').unwrap()];
+    let nearer = format!("{}", first.parse::<f64>().unwrap() + 1.0);
+    let moved = text.replace(
+        &format!("\nposition_mm = [{first},"),
+        &format!("\nposition_mm = [{nearer},"),
+    );
+    let turned = with_edit(&text, at, &format!("rpy_deg = [0, 0, 0.5]\n{at}"));
+    for (edited, what) in [(moved, "1.00 mm from its position"), (turned, "is turned")] {
+        bench.write("patient/edited.toml", edited);
+        export("patient/edited.toml")
+            .exits_with(2)
+            .complains(["phantom.parts", what, "hint: "]);
+    }
+}
+
 #[test]
 fn what_cannot_be_planned_is_said() {
     let bench = built();
@@ -121,7 +197,7 @@ fn what_cannot_be_planned_is_said() {
     fails("ct", "ct build");
     fails("patient --write elsewhere.toml", "scenario's folder");
     // Without markers nobody knows where the robot is: routes by the patient alone, and why.
-    let build = "ct build ct/ct.nii.gz --out unregistered --lesion nodule=-107,10,35 --thickness-mm 2.5 \
+    let build = "ct build ct/ct.nii.gz --out unregistered --lesion nodule=-97,-10,-265 --thickness-mm 2.5 \
                  --room s.toml --no-pictures";
     bench.run(build).exits_with(0);
     let arguments = "ct routes unregistered --directions 1000 --json";
