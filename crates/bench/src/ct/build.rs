@@ -165,7 +165,15 @@ pub(super) fn see(
     let _stage = tracing::info_span!("see").entered();
     let mut remarks = read.remarks;
     // From here on axes are the patient's, whichever way the file has them.
+    let stated_m = read.volume.slice_thickness_m;
     let volume = in_order(read.volume, threads, cancel)?;
+    if let (Some(stated_m), None) = (stated_m, volume.slice_thickness_m) {
+        remarks.push(Remark::new(format!(
+            "the slices are not axial: their thickness of {:.2} mm is not used; the stated accuracy of markers and of \
+             lesions does not know of it",
+            1e3 * stated_m
+        )));
+    }
     let field_of_view = FieldOfView::of(&volume);
     let of_file = volume.grid.clone();
     let resampled = resample(volume, options.max_bytes, threads, cancel)?;
@@ -340,6 +348,11 @@ fn labels_of(
             .into_iter()
             .map(|remark| remark.at("label map")),
     );
+    let hint = if read.is_numbered_here {
+        "rename the files of the masks, or the structures; names of TotalSegmentator and 3D Slicer are known"
+    } else {
+        "give their names with --label-names; names of TotalSegmentator and 3D Slicer are known"
+    };
     let map = read.labels;
     if map
         .names
@@ -355,10 +368,7 @@ fn labels_of(
             names.take(8).collect::<Vec<_>>().join(", ")
         ))
         .at(place)
-        .hint(
-            "give their names with --label-names; names of TotalSegmentator and 3D Slicer are \
-             known",
-        ));
+        .hint(hint));
     }
     Ok(map)
 }

@@ -49,7 +49,8 @@ pub fn overview_text(overview: &[OverviewRow]) -> String {
         column.set_cell_alignment(CellAlignment::Right);
     }
     format!(
-        "{table}\naccuracy: P99 distance of the surface from the voxels, RMS error of a lesion's centroid, TRE of \
+        "{table}\nml: within the surface, or of the voxels of what has none; on coarse voxels they differ, and notes have \
+         the voxels'\naccuracy: P99 distance of the surface from the voxels, RMS error of a lesion's centroid, TRE of \
          markers; whether a structure is what it is taken for is not evaluated"
     )
 }
