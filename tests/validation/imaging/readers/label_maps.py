@@ -22,13 +22,19 @@ STEPS = np.array([[0.7, 0, 0], [0, 0.9, 0], [0, 0, 2.5]])
 FIRST = np.array([-21.3, 14.7, -100.5])
 STRUCTURE_SET = "1.2.840.10008.5.1.4.1.1.481.3"
 NAMES = ["rib_left_7", "lung_left", "tumor", "aorta"]
+# Scans whose columns, rows and slices run otherwise, by nibabel's letters: the same axes backwards, sagittal and
+# coronal stacks, and columns that are slices.
+ORIENTATIONS = ["RAI", "LAS", "PIR", "PSL", "RIA", "SLA"]
 
 
-def volume(path: Path) -> None:
-    hu = np.random.default_rng(5).integers(-1000, 1000, SIZE).astype(np.int16)
+def volume(path: Path, size: tuple[int, ...] = SIZE, steps: np.ndarray = STEPS, first: np.ndarray = FIRST) -> None:
+    """A scan on these voxels; rows of the steps are those of columns, rows and slices."""
+    hu = np.random.default_rng(5).integers(-1000, 1000, size).astype(np.int16)
     image = sitk.GetImageFromArray(np.ascontiguousarray(hu.T))
-    image.SetSpacing(tuple(np.diag(STEPS)))
-    image.SetOrigin(tuple(FIRST))
+    spacing = np.linalg.norm(steps, axis=1)
+    image.SetSpacing(tuple(spacing))
+    image.SetDirection(tuple((steps / spacing[:, None]).T.ravel()))
+    image.SetOrigin(tuple(first))
     sitk.WriteImage(image, str(path))
 
 
@@ -117,17 +123,19 @@ def with_names(path: Path, labels: np.ndarray, code: int) -> None:
     nib.save(image, path)
 
 
-def same(answer: dict, wanted: np.ndarray, names: list[str]) -> None:
+def same(
+    answer: dict, wanted: np.ndarray, names: list[str], steps: np.ndarray = STEPS, first: np.ndarray = FIRST
+) -> None:
     """The labels, and what other libraries read of the segmentation that was written."""
     assert "refused" not in answer, answer
-    labels = np.fromfile(answer["labels"], "<u2").reshape(SIZE, order="F")
+    labels = np.fromfile(answer["labels"], "<u2").reshape(wanted.shape, order="F")
     assert (labels == wanted).all(), f"{(labels != wanted).sum()} voxels differ"
     assert answer["names"] == [[at, name] for at, name in enumerate(names, start=1)], answer["names"]
     values, header = nrrd.read(answer["segmentation"])
     assert header["space"] == "left-posterior-superior"
     assert (values == wanted).all()
-    assert np.abs(header["space directions"] - STEPS).max() < SAME_PLACE_MM
-    assert np.abs(header["space origin"] - FIRST).max() < SAME_PLACE_MM
+    assert np.abs(header["space directions"] - steps).max() < SAME_PLACE_MM
+    assert np.abs(header["space origin"] - first).max() < SAME_PLACE_MM
     for at, name in enumerate(names):
         assert header[f"Segment{at}_Name"] == name
         assert int(header[f"Segment{at}_LabelValue"]) == at + 1
@@ -136,8 +144,9 @@ def same(answer: dict, wanted: np.ndarray, names: list[str]) -> None:
         assert (ends == np.stack([voxels.min(0), voxels.max(0)], axis=1)).all()
     image = sitk.ReadImage(answer["segmentation"])
     assert (sitk.GetArrayFromImage(image).T == wanted).all()
-    assert np.abs(np.array(image.GetOrigin()) - FIRST).max() < SAME_PLACE_MM
-    assert np.abs(np.array(image.GetSpacing()) - np.diag(STEPS)).max() < SAME_PLACE_MM
+    assert np.abs(np.array(image.GetOrigin()) - first).max() < SAME_PLACE_MM
+    directions = np.array(image.GetDirection()).reshape(3, 3) * image.GetSpacing()
+    assert np.abs(directions.T - steps).max() < SAME_PLACE_MM
 
 
 def check(program: Path, folder: Path) -> int:
@@ -158,4 +167,40 @@ def check(program: Path, folder: Path) -> int:
     run = subprocess.run([program, out, scan, *paths], capture_output=True, text=True, timeout=600, check=True)
     for line, (_, wanted, names) in zip(run.stdout.splitlines(), cases, strict=True):
         same(json.loads(line), wanted, names)
-    return len(cases)
+    return len(cases) + turned(program, folder, painted(masks))
+
+
+def turned(program: Path, folder: Path, labels: np.ndarray) -> int:
+    """Scans with other orders of the axes, and label maps with the same and with another one: how many are the same."""
+    straight = folder / "named-0.nii.gz"
+    image = nib.load(straight)
+    own = nib.orientations.io_orientation(image.affine)
+    count = 0
+    for letters in ORIENTATIONS:
+        there = nib.orientations.ornt_transform(own, nib.orientations.axcodes2ornt(letters))
+        moved = nib.Nifti1Image(labels, image.affine).as_reoriented(there)
+        wanted = np.asarray(moved.dataobj)
+        whole = np.diag([-1, -1, 1, 1]) @ moved.affine
+        steps, first = whole[:3, :3].T, whole[:3, 3]
+        assert nib.aff2axcodes(moved.affine) == tuple(letters)
+        scan, same_order = folder / f"scan-{letters}.nrrd", folder / f"labels-{letters}.nii.gz"
+        volume(scan, wanted.shape, steps, first)
+        for extension in image.header.extensions:
+            moved.header.extensions.append(extension)
+        nib.save(moved, same_order)
+        out = folder / f"labels-{letters}"
+        out.mkdir()
+        words = [program, out, scan, straight, same_order]
+        run = subprocess.run(words, capture_output=True, text=True, timeout=600, check=True)
+        lines = run.stdout.splitlines()
+        assert len(lines) == 2, lines
+        for line in lines:
+            same(json.loads(line), wanted, NAMES, steps, first)
+        # The other way: a scan along the patient's axes, and labels that run otherwise.
+        out = folder / f"labels-of-{letters}"
+        out.mkdir()
+        words = [program, out, folder / "scan.nrrd", same_order]
+        run = subprocess.run(words, capture_output=True, text=True, timeout=600, check=True)
+        same(json.loads(run.stdout), labels, NAMES)
+        count += 3
+    return count
