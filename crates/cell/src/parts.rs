@@ -161,6 +161,9 @@ pub struct Cell {
     /// Classes of which not all bodies have a shape, and the parts that have none: nothing is known of the least
     /// clearance there.
     pub unseen: BTreeMap<ClearanceClass, Vec<String>>,
+    /// Where the patient's body may go on behind the cuts of its scan, world; empty where nothing is cut. No body:
+    /// clearances from the patient are evaluated only where it is farther.
+    pub behind_cuts: Vec<Solid>,
 }
 
 /// Volume behind the guide entry that has to stay free: a cylinder about the guide axis, and a cone
@@ -317,6 +320,16 @@ impl Cell {
             bodies,
             pairs,
             unseen,
+            behind_cuts: Vec::new(),
+        }
+    }
+
+    /// The same, of a patient whose body may go on there; world.
+    #[must_use]
+    pub fn with_behind_cuts(self, behind_cuts: Vec<Solid>) -> Self {
+        Self {
+            behind_cuts,
+            ..self
         }
     }
 

@@ -25,6 +25,8 @@ pub use certificate::{
     certify_sampled,
 };
 pub use known_gaps::KnownGaps;
-pub use model::{ClassMinima, ClearanceModel, ClearanceParts, PairClearance};
+pub use model::{
+    CUT_MARGIN_M, ClassMinima, ClearanceModel, ClearanceParts, PairClearance, is_known,
+};
 pub use pairs::{PairConcern, PairExamination, PairSettings, PairState, RangeBound, examine_pairs};
 pub use search::{AIMS, Counted, Counts, Nearby};

@@ -3,8 +3,10 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use needlebench_cell::{BodyPair, Cell, ClearanceClass, CollisionBody, Frame, part_in_words};
-use needlebench_geometry::{PRUNING_MARGIN_M, Placement, Separation, separation_within};
+use needlebench_cell::{
+    BodyKind, BodyPair, Cell, ClearanceClass, CollisionBody, Frame, part_in_words,
+};
+use needlebench_geometry::{PRUNING_MARGIN_M, Placement, Separation, Solid, separation_within};
 use needlebench_kinematics::{Chain, JOINT_COUNT, Joints, Pose};
 
 use crate::body::{LinkPlacements, PlacedBody, placed_body};
@@ -45,19 +47,37 @@ impl PairClearance {
     }
 }
 
+/// What the patient may be nearer by than at a cut of its scan, m: breath and registration move a patient so far.
+pub const CUT_MARGIN_M: f64 = 5e-3;
+
+/// Whether a clearance is known, although the patient may go on behind the cuts of its scan: what it may be is farther, by
+/// [`CUT_MARGIN_M`] at least. `behind_cuts_m` is a lower bound of the distance from it, none where nothing is cut.
+pub fn is_known(clearance_m: f64, behind_cuts_m: Option<f64>) -> bool {
+    behind_cuts_m.is_none_or(|from_m| from_m >= clearance_m.max(0.0) + CUT_MARGIN_M)
+}
+
 /// The least clearance of each class.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClassMinima(pub(crate) [Option<PairClearance>; CLASS_COUNT]);
+pub struct ClassMinima {
+    pub(crate) classes: [Option<PairClearance>; CLASS_COUNT],
+    pub(crate) behind_cuts_m: [Option<f64>; CLASS_COUNT],
+}
 
 impl ClassMinima {
     /// Least clearance of a class, or `None` if the cell has no pair of that class.
     pub fn get(&self, class: ClearanceClass) -> Option<&PairClearance> {
-        self.0[class as usize].as_ref()
+        self.classes[class as usize].as_ref()
+    }
+
+    /// Distance from where the patient's body may go on behind the cuts of its scan, m; none where nothing is cut, or for
+    /// a class that is not from the patient.
+    pub fn behind_cuts_m(&self, class: ClearanceClass) -> Option<f64> {
+        self.behind_cuts_m[class as usize]
     }
 
     /// All classes that the cell has, in the order of [`ClearanceClass`].
     pub fn iter(&self) -> impl Iterator<Item = &PairClearance> {
-        self.0.iter().flatten()
+        self.classes.iter().flatten()
     }
 }
 
@@ -88,6 +108,8 @@ pub struct ClearanceParts<'c> {
     pub bodies: &'c [CollisionBody],
     /// Pairs of them, the moving body first if there is one.
     pub pairs: &'c [BodyPair],
+    /// Where the patient's body may go on behind the cuts of its scan, world.
+    pub behind_cuts: &'c [Solid],
 }
 
 impl<'c> ClearanceParts<'c> {
@@ -98,7 +120,26 @@ impl<'c> ClearanceParts<'c> {
             world_from_base_link: &cell.robot.world_from_base_link,
             bodies: &cell.bodies,
             pairs: &cell.pairs,
+            behind_cuts: &cell.behind_cuts,
         }
+    }
+
+    /// Those of arm and tool with what may be behind the cuts in the patient's place; none where nothing is cut.
+    fn behind_cuts(&self) -> Option<(Vec<CollisionBody>, Vec<BodyPair>)> {
+        if self.behind_cuts.is_empty() {
+            return None;
+        }
+        let is_patient = |body: &CollisionBody| body.kind == BodyKind::Phantom;
+        let bodies = self.bodies.iter().map(|body| {
+            let mut body = body.clone();
+            if is_patient(&body) {
+                body.solids = self.behind_cuts.to_vec();
+            }
+            body
+        });
+        let pairs = self.pairs.iter().copied();
+        let pairs = pairs.filter(|pair| is_patient(&self.bodies[pair.b]));
+        Some((bodies.collect(), pairs.collect()))
     }
 }
 
@@ -113,6 +154,8 @@ pub struct ClearanceModel {
     pub(crate) pairs: Vec<PlacedPair>,
     /// By class: whether there is a pair of it.
     has_class: [bool; CLASS_COUNT],
+    /// That of what may be behind the cuts of the patient's scan; none where nothing is cut.
+    pub(crate) behind_cuts: Option<Arc<ClearanceModel>>,
 }
 
 impl ClearanceModel {
@@ -123,7 +166,7 @@ impl ClearanceModel {
 
     /// Prepares the geometry of what is known of a cell.
     pub fn of_parts(parts: &ClearanceParts<'_>) -> Self {
-        Self::made_of(parts, &[])
+        Self::made_of(parts, None)
     }
 
     /// The model of another cell: what [`ClearanceModel::new`] gives for it, bit for bit, but the
@@ -135,7 +178,7 @@ impl ClearanceModel {
 
     /// [`ClearanceModel::for_cell`] of what is known of a cell.
     pub fn for_parts(&self, parts: &ClearanceParts<'_>) -> Self {
-        Self::made_of(parts, &self.bodies)
+        Self::made_of(parts, Some(self))
     }
 
     /// Number of bodies that the model of a cell would share with this one.
@@ -159,7 +202,8 @@ impl ClearanceModel {
             })
     }
 
-    fn made_of(parts: &ClearanceParts<'_>, known: &[Arc<PlacedBody>]) -> Self {
+    fn made_of(parts: &ClearanceParts<'_>, like: Option<&Self>) -> Self {
+        let known = like.map_or(&[][..], |like| &like.bodies);
         let mut moving = 0;
         let bodies = parts.bodies.iter().enumerate().map(|(index, body)| {
             let placed = placed_body(body, moving, known.get(index));
@@ -187,12 +231,23 @@ impl ClearanceModel {
                 is_convex: is_convex(pair.a) && is_convex(pair.b),
             })
             .collect();
+        let behind_cuts = parts.behind_cuts().map(|(bodies, pairs)| {
+            let parts = ClearanceParts {
+                bodies: &bodies,
+                pairs: &pairs,
+                behind_cuts: &[],
+                ..*parts
+            };
+            let like = like.and_then(|like| like.behind_cuts.as_deref());
+            Arc::new(Self::made_of(&parts, like))
+        });
         Self {
             chain: *parts.chain,
             world_from_base_link: *parts.world_from_base_link,
             bodies,
             pairs,
             has_class,
+            behind_cuts,
         }
     }
 

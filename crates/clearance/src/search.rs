@@ -35,20 +35,36 @@ impl ClearanceModel {
         };
         let mut least = Least::default();
         look.search(&mut Nearby::default(), &mut least);
-        least.minima(&look)
+        self.with_behind_cuts(least.minima(&look), world_from_links)
+    }
+
+    /// The same with the distances from what may be behind the cuts of the patient's scan.
+    fn with_behind_cuts(
+        &self,
+        mut minima: ClassMinima,
+        world_from_links: &[Pose; JOINT_COUNT],
+    ) -> ClassMinima {
+        if let Some(model) = &self.behind_cuts {
+            let behind = model.minimum_per_class_at(world_from_links);
+            for pair in behind.iter() {
+                minima.behind_cuts_m[pair.class as usize] = Some(pair.separation.distance_m);
+            }
+        }
+        minima
     }
 
     /// [`ClearanceModel::minimum_per_class`] of postures that follow each other: what is known from the
     /// one before says of most solids that they are not the nearest.
     pub fn minimum_per_class_near(&self, q: &Joints, nearby: &mut Nearby) -> ClassMinima {
-        let links = self.world_from_links(q).each_ref().map(Placement::new);
+        let world_from_links = self.world_from_links(q);
+        let links = world_from_links.each_ref().map(Placement::new);
         let look = Look {
             model: self,
             links: &links,
         };
         let mut least = Least::default();
         look.search(nearby, &mut least);
-        least.minima(&look)
+        self.with_behind_cuts(least.minima(&look), &world_from_links)
     }
 
     /// Least clearances as far as they count, and no farther; of postures that follow each other, as
@@ -509,10 +525,13 @@ impl Least {
     /// What was found, as it is reported.
     pub fn minima(&self, look: &Look<'_>) -> ClassMinima {
         let found = self.0.each_ref();
-        ClassMinima(found.map(|best| {
-            let (couple, separation) = best.as_ref()?;
-            Some(look.clearance(*couple, separation))
-        }))
+        ClassMinima {
+            classes: found.map(|best| {
+                let (couple, separation) = best.as_ref()?;
+                Some(look.clearance(*couple, separation))
+            }),
+            behind_cuts_m: [None; CLASS_COUNT],
+        }
     }
 }
 

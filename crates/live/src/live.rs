@@ -50,6 +50,7 @@ impl Live {
             world_from_base_link: &scene.world_from_base_link,
             bodies: &bodies,
             pairs,
+            behind_cuts: &[],
         };
         let model = ClearanceModel::of_parts(&parts(&scene.pairs));
         let standing = model.for_parts(&parts(&standing_pairs));
@@ -98,6 +99,7 @@ impl Live {
             world_from_base_link,
             bodies: &self.bodies,
             pairs,
+            behind_cuts: &[],
         };
         let model = self.model.for_parts(&parts(&self.scene.pairs));
         self.standing = model.for_parts(&parts(&self.standing_pairs));

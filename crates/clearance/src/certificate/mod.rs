@@ -100,7 +100,7 @@ mod tests;
 use needlebench_cell::ClearanceClass;
 use needlebench_kinematics::trajectory::Phase;
 
-use crate::model::{CLASS_COUNT, ClearanceModel, PairClearance};
+use crate::model::{CLASS_COUNT, CUT_MARGIN_M, ClearanceModel, PairClearance};
 
 pub use motion::{Motion, RecordedMotion, Span};
 
@@ -152,6 +152,10 @@ pub struct ClassCertificate {
     pub time_s: f64,
     /// Phase of that time.
     pub phase: Phase,
+    /// Lower bound of the distance from where the patient's body may go on behind the cuts of its scan, at every time of
+    /// the motion, m; not resolved beyond where [`is_known`](crate::is_known) holds. None where nothing is cut, or for a class that is not
+    /// from the patient.
+    pub behind_cuts_m: Option<f64>,
 }
 
 impl ClassCertificate {
@@ -214,6 +218,10 @@ impl MotionCertificate {
             };
             *mine = Some(ClassCertificate {
                 lower_bound_m: one.lower_bound_m.min(two.lower_bound_m),
+                behind_cuts_m: match (one.behind_cuts_m, two.behind_cuts_m) {
+                    (Some(one), Some(two)) => Some(one.min(two)),
+                    (one, two) => one.or(two),
+                },
                 ..nearer
             });
         }
@@ -241,14 +249,35 @@ pub fn certify(
     motion: &impl Motion,
     options: &CertificateOptions,
 ) -> MotionCertificate {
-    search::certify(
-        model,
-        motion,
-        options,
-        &[],
-        [f64::INFINITY; CLASS_COUNT],
-        1.0,
-    )
+    let all = [f64::INFINITY; CLASS_COUNT];
+    let found = search::certify(model, motion, options, &[], all, 1.0);
+    with_behind_cuts(found, model, motion, options)
+}
+
+/// The same with the distances from what may be behind the cuts of the patient's scan, as far as they matter.
+fn with_behind_cuts(
+    mut certificate: MotionCertificate,
+    model: &ClearanceModel,
+    motion: &impl Motion,
+    options: &CertificateOptions,
+) -> MotionCertificate {
+    let Some(behind_cuts) = &model.behind_cuts else {
+        return certificate;
+    };
+    let enough_m = certificate.classes.map(|class| {
+        class.map_or(f64::NEG_INFINITY, |class| {
+            let attained_m = class.attained.separation.distance_m.max(0.0);
+            // Bounds of what is enough may be less by the tolerance and rounding.
+            attained_m + CUT_MARGIN_M + options.tolerance_m + ROUNDING_M
+        })
+    });
+    let found = search::certify(behind_cuts, motion, options, &[], enough_m, 1.0);
+    for (class, found) in certificate.classes.iter_mut().zip(&found.classes) {
+        if let (Some(class), Some(found)) = (class, found) {
+            class.behind_cuts_m = Some(found.lower_bound_m);
+        }
+    }
+    certificate
 }
 
 /// [`certify`] as far as it matters: a class is known to the tolerance where it comes nearer than
@@ -275,12 +304,7 @@ pub fn certify_sampled(
     options: &CertificateOptions,
     samples_s: &[f64],
 ) -> MotionCertificate {
-    search::certify(
-        model,
-        motion,
-        options,
-        samples_s,
-        [f64::INFINITY; CLASS_COUNT],
-        1.0,
-    )
+    let all = [f64::INFINITY; CLASS_COUNT];
+    let found = search::certify(model, motion, options, samples_s, all, 1.0);
+    with_behind_cuts(found, model, motion, options)
 }

@@ -367,6 +367,7 @@ impl<M: Motion> Search<'_, M> {
                 attained: *found,
                 time_s,
                 phase,
+                behind_cuts_m: None,
             });
         }
     }

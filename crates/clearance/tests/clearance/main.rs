@@ -2,6 +2,7 @@
 
 mod cell;
 mod common;
+mod cuts;
 mod obstacles;
 mod pairs;
 mod shipped_arms;
