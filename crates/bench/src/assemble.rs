@@ -34,6 +34,7 @@ use crate::events::{EventRun, events_report};
 use crate::provenance::provenance;
 use crate::setup::Setup;
 use crate::simulate::EngineRun;
+use crate::study::set_clearances;
 
 /// What the stages of a run made.
 pub(crate) struct Results<'a> {
@@ -299,12 +300,15 @@ fn configuration_report(
         })
         .collect();
     let mut clearance = overall_clearance(setup, plan, &engines);
-    let mut posture_clearance_m = candidate.map_or_else(BTreeMap::new, |each| {
-        let found = each.clearance.iter();
-        found
-            .map(|pair| (pair.class.name(), pair.separation.distance_m))
-            .collect()
-    });
+    let mut posture = ConfigurationReport::new(plan.configuration.label());
+    if let Some(candidate) = candidate {
+        set_clearances(&mut posture, &candidate.clearance);
+    }
+    let ConfigurationReport {
+        mut posture_clearance_m,
+        posture_behind_cuts_m,
+        ..
+    } = posture;
     if let Some(route) = route {
         let class = ClearanceClass::NeedleRoute.name();
         clearance.classes.insert(class, route.clone());
@@ -350,6 +354,7 @@ fn configuration_report(
         referee: judged.referee.clone(),
         clearance,
         posture_clearance_m,
+        posture_behind_cuts_m,
         surplus_m: surplus_m(&setup.planner, plan),
         predicted: if real.is_imperfect() {
             predicted.map(|each| each.needle)
@@ -470,10 +475,13 @@ fn overall_clearance(
                 .certified_lower_bound_m
                 .zip(found.certified_lower_bound_m)
                 .map(|(one, other)| one.min(other));
+            let behind_cuts_m = known.behind_cuts_m.zip(found.behind_cuts_m);
+            let behind_cuts_m = behind_cuts_m.map(|(one, other)| one.min(other));
             if found.minimum_m < known.minimum_m {
                 *known = found.clone();
             }
             known.certified_lower_bound_m = bound_m;
+            known.behind_cuts_m = behind_cuts_m;
         }
     }
     ClearanceReport::new(classes)

@@ -8,7 +8,7 @@
 use needlebench_cell::{Cell, ClearanceClass, Rule, part_in_words, reason_in_words};
 use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_evaluation::report::{ConfigurationReport, RejectionReport, RouteReport};
-use needlebench_evaluation::{first_missed_by_posture, route_is_expected};
+use needlebench_evaluation::{PostureFault, judge_posture, route_is_expected};
 use needlebench_input::Finding;
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::ik::Configuration;
@@ -65,12 +65,15 @@ pub struct GoalPreview {
 pub struct ConfigurationPreview {
     /// Its label.
     pub label: &'static str,
-    /// Its final posture violates nothing.
+    /// Its final posture violates nothing, and all clearances are evaluated.
     pub works: bool,
     /// Rules that it violates, the first failing one first.
     pub rejections: Vec<RejectionReport>,
     /// The first criterion that it fails, if it violates no rule.
     pub missed: Option<&'static str>,
+    /// Why a clearance is not evaluated, if it violates no rule and fails no criterion: `scan_ends robot_phantom`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_judged: Option<String>,
     /// The posture that was looked at, if the pose is in reach.
     pub joints_rad: Option<[f64; 6]>,
     /// What arm and tool come nearest to in it; none out of reach, or if there is nothing to be near to.
@@ -106,10 +109,11 @@ impl NearestPair {
 }
 
 impl ConfigurationPreview {
-    /// The first rule or criterion that it violates; empty if it is feasible.
+    /// The first rule or criterion that it violates, or why it is not evaluated; empty if it is feasible.
     pub fn reason(&self) -> &str {
         let rule = self.rejections.first().map(|rejection| rejection.rule);
-        rule.or(self.missed).unwrap_or_default()
+        let violated = rule.or(self.missed);
+        violated.or(self.not_judged.as_deref()).unwrap_or_default()
     }
 }
 
@@ -197,17 +201,24 @@ fn configuration_preview(
     configuration: Configuration,
     member: &Member,
 ) -> ConfigurationPreview {
-    let missed = member.candidate.as_ref().and_then(|candidate| {
+    let fault = member.candidate.as_ref().and_then(|candidate| {
         let mut posture = ConfigurationReport::new(configuration.label());
         set_clearances(&mut posture, &candidate.clearance);
-        first_missed_by_posture(&posture, &resolved.scenario.criteria)
+        judge_posture(&posture, &resolved.scenario.criteria)
     });
-    let missed = missed.filter(|_| member.works());
+    let fault = fault.filter(|_| member.works());
+    let works = member.works() && fault.is_none();
+    let (missed, not_judged) = match fault {
+        Some(PostureFault::Missed(missed)) => (Some(missed), None),
+        Some(PostureFault::NotJudged(reason)) => (None, Some(reason)),
+        None => (None, None),
+    };
     ConfigurationPreview {
         label: configuration.label(),
-        works: member.works() && missed.is_none(),
+        works,
         rejections: member.rejections.iter().map(rejection_report).collect(),
         missed,
+        not_judged,
         joints_rad: member.candidate.as_ref().map(|each| each.joints.into()),
         nearest: member
             .candidate
@@ -278,7 +289,7 @@ fn reach_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
         let mut reasons: Vec<String> = Vec::new();
         for each in goal.configurations.iter().filter(|each| !each.works) {
             let rule = first(each).map(|rejection| rejection.rule.to_owned());
-            let reason = rule.or(each.missed.map(str::to_owned)).unwrap_or_default();
+            let reason = rule.unwrap_or_else(|| each.reason().to_owned());
             let reason = reason_in_words(&reason);
             if !reasons.contains(&reason) {
                 reasons.push(reason);

@@ -6,19 +6,16 @@ use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use nalgebra::{Point3, UnitQuaternion};
-use needlebench_cell::{BodyKind, ClearanceClass};
+use needlebench_cell::ClearanceClass;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
 use needlebench_evaluation::report::{
-    ClassClearance, EngineFailure, GoalReport, NotJudged, Report, Status, Verdict,
+    EngineFailure, GoalReport, NotJudged, Report, Status, Verdict,
 };
 use needlebench_evaluation::trace::trace;
 use needlebench_evaluation::{
     comparing_engines, criteria_with_limits, excitation as excited, iso9283 as protocol,
 };
-use needlebench_geometry::{PreparedShape, Shape, separation};
-use needlebench_kinematics::Pose;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::GoalPlan;
 use needlebench_scenario::ResolvedScenario;
@@ -78,7 +75,6 @@ pub(crate) fn judge_rest(
 ) {
     judge_alone(report, resolved, options, engines);
     judge_unseen(report, resolved);
-    judge_cuts(report, resolved);
     judge_absent(report, resolved, engines);
     trace(report, &resolved.scenario.requirements);
 }
@@ -128,87 +124,6 @@ fn judge_unseen(report: &mut Report, resolved: &ResolvedScenario) {
         leave_open(report, &[&key], &reason);
     }
 }
-
-/// A clearance from the patient is not evaluated where the body may go on nearer, behind a cut of the scan. The
-/// planning's own limits are on it even where no criterion is. It is a failure all the same where it is too small.
-fn judge_cuts(report: &mut Report, resolved: &ResolvedScenario) {
-    let Some(placed) = &resolved.phantom else {
-        return;
-    };
-    let world_from_phantom = placed.world_from_phantom;
-    let skin = &placed.phantom.skin().name;
-    let patient = resolved.cell.bodies.iter();
-    let patient = patient.filter(|body| body.kind == BodyKind::Phantom);
-    let limbs = patient.flat_map(|body| &body.solids);
-    let limbs = limbs.filter(|solid| solid.name != *skin);
-    let limbs: Vec<(PreparedShape, Pose)> = limbs
-        .map(|solid| (PreparedShape::new(&solid.shape), solid.parent_from_shape))
-        .collect();
-    let ball = PreparedShape::new(&Shape::Sphere {
-        radius_m: SAME_LIMB_M,
-    });
-    let is_limb = |at: &Point3<f64>| {
-        let at = Pose::from_parts((world_from_phantom * at).into(), UnitQuaternion::identity());
-        let mut limbs = limbs.iter();
-        limbs.any(|(limb, place)| separation(&ball, &at, limb, place).distance_m <= 0.0)
-    };
-    let Some(unseen) = placed.phantom.unseen_body(is_limb) else {
-        return;
-    };
-    let phantom_from_world = world_from_phantom.inverse();
-    let is_at_cut = |found: &ClassClearance| {
-        let from_unseen_m = found
-            .witness_points_m
-            .iter()
-            .map(|point| unseen.distance_m(&(phantom_from_world * Point3::from(*point))));
-        from_unseen_m.fold(f64::INFINITY, f64::min) <= found.minimum_m.max(0.0) + AT_CUT_M
-    };
-    let mut left_open = Vec::new();
-    for goal in &report.goals {
-        for configuration in &goal.configurations {
-            if configuration.status == Status::Rejected {
-                continue;
-            }
-            for class in FROM_PATIENT.map(ClearanceClass::name) {
-                let found = configuration.clearance.classes.get(class);
-                if !found.is_some_and(is_at_cut) {
-                    continue;
-                }
-                let key = format!("min_clearance_mm.{class}");
-                let known = report.criteria.iter().position(|each| {
-                    each.criterion == key
-                        && each.goal == goal.name
-                        && each.label.as_deref() == Some(configuration.label)
-                });
-                match known {
-                    Some(at) if !report.criteria[at].pass => continue,
-                    Some(at) => {
-                        report.criteria.remove(at);
-                    }
-                    None => {}
-                }
-                left_open.push((goal.name.clone(), Some(configuration.label.to_owned()), key));
-            }
-        }
-    }
-    not_judged(report, left_open, AT_CUT);
-}
-
-/// What may be nearer to the patient than a scan shows.
-const FROM_PATIENT: [ClearanceClass; 3] = [
-    ClearanceClass::RobotPhantom,
-    ClearanceClass::ToolPhantom,
-    ClearanceClass::GuideStandoff,
-];
-
-/// A cut is that of a limb of the model within this, m (assumed: what limbs of people differ by).
-const SAME_LIMB_M: f64 = 0.01;
-
-/// The nearest point is taken for one of the cut so near to it, m: what breath and registration move a patient.
-const AT_CUT_M: f64 = 5e-3;
-
-/// Why a clearance from the patient is not evaluated.
-const AT_CUT: &str = "nearest where the scan ends, and the skin beyond was not seen";
 
 /// A required criterion for which the scenario has no value, such as the clearance of a gantry that is not in the
 /// room, is not evaluated.

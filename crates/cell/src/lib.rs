@@ -21,4 +21,6 @@ pub use pairs::{LeftOut, PairRule, pair_rule, place_in_chain};
 pub use parts::{BodyPair, Cell, Link, Needle, NeedleCorridor, Robot, Tool, UnseenPart, placed};
 pub use physics::{EngineSettings, MujocoSettings, RapierSettings, STANDARD_GRAVITY_M_S2};
 pub use rule::{Amount, Rule};
-pub use words::{pair_in_words, part_in_words, reason_in_words, rule_in_words};
+pub use words::{
+    SCAN_ENDS, UNSEEN_BODY, pair_in_words, part_in_words, reason_in_words, rule_in_words,
+};

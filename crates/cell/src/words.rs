@@ -128,6 +128,11 @@ pub fn reason_in_words(detail: &str) -> String {
         .or_else(|| of_class("too_close ", "too close to"))
         .or_else(|| of_class("no_motion ", "blocked by"))
         .or_else(|| of_class("min_clearance_mm.", "too close to"))
+        .or_else(|| {
+            let class = ClearanceClass::named(detail.strip_prefix(SCAN_ENDS)?.trim_start())?;
+            let [this, other] = class_in_words(class);
+            Some(format!("{this} to {other} not evaluated (scan ends)"))
+        })
         // A key of the scenario stays one, for invalid layouts.
         .unwrap_or_else(|| {
             if detail.contains('.') {
@@ -137,6 +142,12 @@ pub fn reason_in_words(detail: &str) -> String {
             }
         })
 }
+
+/// Why a clearance from the patient is not evaluated.
+pub const UNSEEN_BODY: &str = "where the scan ends, the unseen body may be nearer";
+
+/// Name of that reason before the class of the clearance: `scan_ends robot_phantom`.
+pub const SCAN_ENDS: &str = "scan_ends";
 
 /// `left lung` for `lung_left`.
 fn sided(body: &str) -> Option<String> {

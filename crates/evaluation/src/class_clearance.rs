@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use needlebench_cell::ClearanceClass;
+use needlebench_clearance::is_known;
 use serde::Serialize;
 
 /// Least clearance of a class.
@@ -17,6 +18,10 @@ pub struct ClassClearance {
     /// none without breath. Only the rest of the distance between bound and minimum is what the proof could not close.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub breath_allowance_m: Option<f64>,
+    /// Lower bound of the distance from where the patient's body may go on behind the cuts of its scan, not resolved
+    /// beyond what matters; none where nothing is cut, or for a class that is not from the patient.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub behind_cuts_m: Option<f64>,
     /// The two solids.
     pub pair: [String; 2],
     /// Nearest (or deepest) points of the two, in the world.
@@ -82,6 +87,13 @@ impl ClearanceReport {
             })
             .map(|(_, found)| found)
             .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
+    }
+
+    /// Names of the classes of which the clearance is not known: the patient may be nearer behind the cuts of its scan.
+    pub fn unknown(&self) -> impl Iterator<Item = &'static str> {
+        let classes = self.classes.iter();
+        let unknown = classes.filter(|(_, found)| !is_known(found.minimum_m, found.behind_cuts_m));
+        unknown.map(|(class, _)| *class)
     }
 
     fn physical(&self) -> impl Iterator<Item = &ClassClearance> {

@@ -232,6 +232,9 @@ fn take_minima(
             // The bound holds for samples too; only rounding could say otherwise.
             least.certified_lower_bound_m = Some(found.lower_bound_m.min(least.minimum_m));
         }
+        if let Some(least) = minima.get_mut(&class) {
+            least.behind_cuts_m = found.behind_cuts_m;
+        }
     }
 }
 
@@ -260,9 +263,14 @@ pub fn posture_clearance(
         .iter()
         .map(|pair| {
             let solids = pair.solid_names(cell);
+            let found = class_clearance(solids, &pair.separation, "final_posture", None, None);
+            let behind_cuts_m = minima.behind_cuts_m(pair.class);
             (
                 pair.class,
-                class_clearance(solids, &pair.separation, "final_posture", None, None),
+                ClassClearance {
+                    behind_cuts_m,
+                    ..found
+                },
             )
         })
         .collect()
@@ -289,6 +297,7 @@ pub(crate) fn class_clearance(
         minimum_m: separation.distance_m,
         certified_lower_bound_m: None,
         breath_allowance_m: None,
+        behind_cuts_m: None,
         pair: [solid_a.to_owned(), solid_b.to_owned()],
         witness_points_m: [
             separation.point_on_a.coords.into(),

@@ -1,5 +1,8 @@
 //! Criteria of a scenario on the values of a configuration.
 
+use std::borrow::Cow;
+
+use needlebench_cell::{SCAN_ENDS, UNSEEN_BODY};
 use needlebench_input::Limit;
 use needlebench_scenario::scenario::CriteriaSection;
 use needlebench_scenario::study::StudyMode;
@@ -213,7 +216,19 @@ pub fn check_configuration(
     if let Some(events) = &configuration.events {
         judged.extend(events.checks.clone());
     }
+    for class in configuration.unknown_clearances() {
+        judged.leave_open(&missing(
+            None,
+            &clearance_key(class),
+            UNSEEN_BODY.to_owned(),
+        ));
+    }
     judged
+}
+
+/// Key of the criterion on the clearance of a class.
+fn clearance_key(class: &str) -> String {
+    format!("min_clearance_mm.{class}")
 }
 
 /// Whether a configuration has any of a family's metrics.
@@ -279,6 +294,39 @@ pub fn first_missed_by_posture(
     let mut all = of_configuration(posture, criteria, StudyMode::Static);
     let missed = all.find(|checked| checked.value.is_some() && !checked.is_met());
     missed.map(|checked| checked.criterion.key)
+}
+
+/// The first criterion that a static case's posture misses, or else why one on its clearances is not evaluated, in
+/// the words of [`NotJudged::detail`].
+pub fn judge_posture(
+    posture: &ConfigurationReport,
+    criteria: &CriteriaSection,
+) -> Option<PostureFault> {
+    if let Some(missed) = first_missed_by_posture(posture, criteria) {
+        return Some(PostureFault::Missed(missed));
+    }
+    let unknown = posture.unknown_clearances();
+    let first = unknown.first()?;
+    Some(PostureFault::NotJudged(format!("{SCAN_ENDS} {first}")))
+}
+
+/// What there is against a posture.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum PostureFault {
+    /// It misses this criterion.
+    Missed(&'static str),
+    /// It misses none that is known, and a clearance is not evaluated for this reason.
+    NotJudged(String),
+}
+
+impl PostureFault {
+    /// The criterion, or the reason.
+    pub fn into_detail(self) -> Cow<'static, str> {
+        match self {
+            Self::Missed(criterion) => criterion.into(),
+            Self::NotJudged(reason) => reason.into(),
+        }
+    }
 }
 
 /// What a radian or a plain number counts in metres, where unlike criteria are compared: about the lever of the wrist.

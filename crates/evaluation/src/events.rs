@@ -17,7 +17,7 @@ pub use press::{
 pub use retract::{RetractionEngineReport, measure_retraction};
 pub use stop::{StopEngineReport, measure_stop};
 
-use crate::report::Judged;
+use crate::report::{ClearanceReport, Judged};
 
 /// Events of one configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
@@ -31,6 +31,16 @@ pub struct EventsReport {
     /// What was evaluated and what was to be; in the report's own lists of criteria.
     #[serde(skip)]
     pub checks: Judged,
+}
+
+impl EventsReport {
+    /// Clearances of the motions of stop and retreat, in all engines.
+    pub(crate) fn clearances(&self) -> impl Iterator<Item = &ClearanceReport> {
+        let stops = self.stop.iter().flat_map(|stop| stop.engines.values());
+        let retreats = self.retract.values();
+        let stops = stops.map(|engine| &engine.clearance);
+        stops.chain(retreats.map(|engine| &engine.clearance))
+    }
 }
 
 /// A stop on the way in.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::ClearanceClass;
+use needlebench_cell::{ClearanceClass, UNSEEN_BODY};
 use needlebench_scenario::scenario::CriteriaSection;
 use serde::Serialize;
 
@@ -120,6 +120,15 @@ pub fn judge(report: &ExcitationReport, general: &CriteriaSection, engines: &[&s
                 pass: value.is_some_and(|value| value >= limits_m[which]),
                 ..about(engine, criterion)
             };
+            let is_unknown = which == 0 && found.is_some_and(|it| it.unknown().next().is_some());
+            if is_unknown && result.pass {
+                let unjudged = CriterionResult {
+                    value: None,
+                    ..result
+                };
+                judged.add(unjudged, || UNSEEN_BODY.to_owned());
+                continue;
+            }
             judged.add(result, || {
                 engine.map_or(String::new(), |(name, _)| unmeasured_by(name))
             });

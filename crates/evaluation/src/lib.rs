@@ -40,8 +40,8 @@ pub use clearance::{
 };
 pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds};
 pub use criteria::{
-    check_configuration, comparing_engines, criteria_with_limits, first_missed_by_posture,
-    worst_miss_by_posture_m,
+    PostureFault, check_configuration, comparing_engines, criteria_with_limits,
+    first_missed_by_posture, judge_posture, worst_miss_by_posture_m,
 };
 pub use engine_pairs::{largest_over_pairs, pairs};
 pub use judge::{EXPECTED, judge, route_is_expected};

@@ -31,7 +31,8 @@ struct Column {
 
 /// Marks the Pareto set of a goal, ranks its configurations and recommends the first.
 ///
-/// Takes the statuses as they are: only what is `ok` is compared.
+/// Takes the statuses as they are: only what is `ok` is compared, and of that only what the unseen body behind the cuts of
+/// a scan cannot be nearer to.
 pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
     for each in &mut goal.configurations {
         each.pareto = false;
@@ -39,7 +40,10 @@ pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
         each.ranking = None;
     }
     let working: Vec<usize> = (0..goal.configurations.len())
-        .filter(|&index| goal.configurations[index].status == Status::Ok)
+        .filter(|&index| {
+            let each = &goal.configurations[index];
+            each.status == Status::Ok && each.unknown_clearances().is_empty()
+        })
         .collect();
     let label = |at: usize| goal.configurations[working[at]].label;
     let (metrics, columns) = columns(&goal.configurations, &working, ranking);

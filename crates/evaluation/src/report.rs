@@ -1,7 +1,8 @@
 //! The report: every value that a run gives, with the keys that others build on.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use needlebench_clearance::is_known;
 use needlebench_engine::EngineIdentity;
 use needlebench_robot::{ArmReport, LinkEnclosure};
 use needlebench_scenario::GravitySettings;
@@ -354,6 +355,10 @@ pub struct ConfigurationReport {
     /// Signed clearances by class of the final posture of the nominal arm, with the needle path; empty without a
     /// posture.
     pub posture_clearance_m: BTreeMap<&'static str, f64>,
+    /// Distances of the same posture by class from where the patient's body may go on behind the cuts of its scan; empty
+    /// where nothing is cut.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub posture_behind_cuts_m: BTreeMap<&'static str, f64>,
     /// Constraint margin: distance of the posture from violating a planning rule, negative where it violates one; sines
     /// and radians count 0.1 m.
     pub surplus_m: Option<f64>,
@@ -411,6 +416,7 @@ impl ConfigurationReport {
             clearance: ClearanceReport::default(),
             events: None,
             posture_clearance_m: BTreeMap::new(),
+            posture_behind_cuts_m: BTreeMap::new(),
             surplus_m: None,
             predicted: None,
             room: None,
@@ -424,6 +430,44 @@ impl ConfigurationReport {
             metrics: BTreeMap::new(),
             files: Vec::new(),
         }
+    }
+
+    /// The same, if what is not known of its clearances were the worst that can be; none where all are known. A value that
+    /// differs in it is not known either.
+    #[must_use]
+    pub fn at_worst(&self) -> Option<Self> {
+        let unknown = self.unknown_clearances();
+        if unknown.is_empty() {
+            return None;
+        }
+        let mut worst = self.clone();
+        for class in unknown {
+            if let Some(found) = worst.clearance.classes.get_mut(class) {
+                found.minimum_m = f64::NEG_INFINITY;
+                found.certified_lower_bound_m = Some(f64::NEG_INFINITY);
+            }
+            if let Some(clearance_m) = worst.posture_clearance_m.get_mut(class) {
+                *clearance_m = f64::NEG_INFINITY;
+            }
+        }
+        Some(worst)
+    }
+
+    /// Classes of which the clearance is not known, since the patient may be nearer behind the cuts of its scan: along the
+    /// motion and the retreat, planned and prescribed, or in the posture where there is no motion.
+    pub fn unknown_clearances(&self) -> BTreeSet<&'static str> {
+        if !self.clearance.classes.is_empty() {
+            let events = self.events.iter().flat_map(EventsReport::clearances);
+            let motions = [&self.clearance, &self.retreat_clearance].into_iter();
+            let motions = motions.chain(events);
+            return motions.flat_map(ClearanceReport::unknown).collect();
+        }
+        let classes = self.posture_clearance_m.iter();
+        let unknown = classes.filter(|(class, clearance_m)| {
+            let behind_cuts_m = self.posture_behind_cuts_m.get(*class);
+            !is_known(**clearance_m, behind_cuts_m.copied())
+        });
+        unknown.map(|(class, _)| *class).collect()
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a criterion came to, and all of them together.
 
+use needlebench_cell::{SCAN_ENDS, UNSEEN_BODY};
 use serde::Serialize;
 
 /// Whether all criteria were met.
@@ -55,6 +56,17 @@ pub struct NotJudged {
     pub requirement: Option<String>,
 }
 
+impl NotJudged {
+    /// What stands for it where one word has to do: its criterion, or `scan_ends` and the class of a clearance.
+    pub fn detail(&self) -> String {
+        let class = self.criterion.strip_prefix("min_clearance_mm.");
+        match class.filter(|_| self.reason == UNSEEN_BODY) {
+            Some(class) => format!("{SCAN_ENDS} {class}"),
+            None => self.criterion.clone(),
+        }
+    }
+}
+
 /// Criteria, as far as they could be evaluated.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Judged {
@@ -84,6 +96,20 @@ impl Judged {
                 reason: reason(),
                 requirement: None,
             });
+        }
+    }
+
+    /// A criterion is not evaluated, and has no result that would be a pass: what is known to fail fails all the same.
+    pub(crate) fn leave_open(&mut self, open: &NotJudged) {
+        let is_it = |each: &CriterionResult| {
+            each.criterion == open.criterion
+                && each.goal == open.goal
+                && each.label == open.label
+                && each.engine == open.engine
+        };
+        self.results.retain(|each| !is_it(each) || !each.pass);
+        if !self.results.iter().any(is_it) {
+            self.not_judged.push(open.clone());
         }
     }
 

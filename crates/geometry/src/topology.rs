@@ -99,7 +99,7 @@ pub(crate) fn weld_near(mesh: &TriangleMesh, near_m: f64) -> TriangleMesh {
 
 /// The triangles of each part that shares no vertex with another; parts by their first triangle,
 /// triangles in their order. All triangles must name vertices that are there.
-pub(crate) fn connected_parts(mesh: &TriangleMesh) -> Vec<Vec<usize>> {
+pub fn connected_parts(mesh: &TriangleMesh) -> Vec<Vec<usize>> {
     // A forest of vertices: each tree is a part, and its root stands for it.
     let mut above: Vec<u32> = (0..).take(mesh.vertices_m.len()).collect();
     for &[a, b, c] in &mesh.triangles {

@@ -43,8 +43,8 @@ pub use route_obstacles::{RouteObstacle, RouteObstacles};
 use envelope::Envelope;
 pub use half_spaces::HalfSpaces;
 pub use limbs::{Support, limbs};
+pub use scan_ends::ScanEnd;
 use scan_ends::ScanEnds;
-pub use scan_ends::{ScanEnd, UnseenBody};
 pub use skin::SkinSurface;
 
 /// Colour of the skin.
@@ -275,11 +275,18 @@ impl Phantom {
         ends.is_none_or(|ends| ends.is_seen(point))
     }
 
-    /// Where the body may go on behind the cuts of a scan; none where nothing is cut. A cut face is known to go on as
-    /// something else where all its corners (phantom frame) are in what is modelled, such as the arms.
-    pub fn unseen_body(&self, is_modelled: impl Fn(&Point3<f64>) -> bool) -> Option<UnseenBody> {
-        let ends = self.scan_ends.as_ref()?;
-        ends.unseen_body(self.skin(), is_modelled)
+    /// Where the body may go on behind the cuts of a scan (phantom frame); empty where nothing is cut: of each cut and each
+    /// connected piece of the skin beyond its plane, the convex hull of the piece and of what lies straight behind it,
+    /// 3 m far. That the body is no wider there than the piece is assumed. A piece is known to go on as something else
+    /// where its corners (phantom frame) are in what is modelled, such as the arms.
+    pub fn unseen_body(&self, is_modelled: impl Fn(&Point3<f64>) -> bool) -> Vec<Solid> {
+        let ends = self.scan_ends.as_ref();
+        ends.map_or_else(Vec::new, |ends| ends.unseen_body(self.skin(), is_modelled))
+    }
+
+    /// Whether a scan that the parts are from ends at any plane.
+    pub fn has_scan_ends(&self) -> bool {
+        self.scan_ends.is_some()
     }
 
     /// Bones, vessels, organs and fissures, ready for distances; prepared once.

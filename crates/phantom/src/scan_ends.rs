@@ -1,8 +1,11 @@
 //! Where a scan cuts the body.
 
-use nalgebra::{Point3, UnitVector3};
-use needlebench_geometry::mesh::SurfaceIndex;
-use needlebench_geometry::{Solid, TriangleMesh};
+use std::sync::Arc;
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use needlebench_geometry::mesh::{connected_parts, simplified_hull, weld};
+use needlebench_geometry::{ConvexMesh, Shape, Solid, TriangleMesh};
+use needlebench_kinematics::Pose;
 
 use crate::half_spaces::HalfSpaces;
 
@@ -22,26 +25,11 @@ pub(crate) struct ScanEnds {
     seen: HalfSpaces,
 }
 
-/// Where a body may go on behind the ends of its scan: the faces of the cuts, and what lies straight behind them.
-#[derive(Debug, Clone)]
-pub struct UnseenBody {
-    faces: SurfaceIndex,
-    /// Normals of the ends, and how far the body goes along them, m.
-    reaches: Vec<(UnitVector3<f64>, f64)>,
-}
+/// How far the body may go on behind a cut, m: farther than anybody is tall.
+const GOES_ON_M: f64 = 3.0;
 
-impl UnseenBody {
-    /// How far a point (phantom frame) is from it, m.
-    pub fn distance_m(&self, point: &Point3<f64>) -> f64 {
-        // Back along the normal of each end to where the body was cut.
-        let mut point = *point;
-        for (normal, reach_m) in &self.reaches {
-            let behind_m = normal.dot(&point.coords) - reach_m;
-            point -= behind_m.max(0.0) * normal.into_inner();
-        }
-        self.faces.distance_m(&point)
-    }
-}
+/// What a hull may leave out of its points, m: a tenth of what a clearance beside it has to spare.
+const LEFT_OUT_M: f64 = 5e-4;
 
 impl ScanEnds {
     pub fn new(ends: Vec<ScanEnd>) -> Self {
@@ -61,38 +49,104 @@ impl ScanEnds {
         &self,
         skin: &Solid,
         is_modelled: impl Fn(&Point3<f64>) -> bool,
-    ) -> Option<UnseenBody> {
+    ) -> Vec<Solid> {
         // A polyhedron is its own surface, whatever the fineness.
-        let TriangleMesh {
-            mut vertices_m,
-            triangles,
-        } = skin.shape.surface(0.0);
-        for vertex in &mut vertices_m {
+        let mut surface = skin.shape.surface(0.0);
+        for vertex in &mut surface.vertices_m {
             *vertex = skin.parent_from_shape * *vertex;
         }
-        let reaches = self.ends.iter().map(|end| {
-            let along_m = vertices_m.iter().map(|at| end.normal.dot(&at.coords));
-            (end.normal, along_m.fold(f64::NEG_INFINITY, f64::max))
-        });
-        let reaches = reaches.collect();
-        let is_cut = |at: &Point3<f64>| !self.is_seen(at);
-        let is_cut: Vec<bool> = vertices_m.iter().map(is_cut).collect();
-        let triangles: Vec<_> = triangles
-            .into_iter()
-            .filter(|corners| {
-                let corners = corners.map(|corner| corner as usize);
-                corners.iter().all(|&corner| is_cut[corner])
-                    && !corners
-                        .iter()
-                        .all(|&corner| is_modelled(&vertices_m[corner]))
-            })
+        weld(&mut surface);
+        let TriangleMesh {
+            vertices_m,
+            triangles,
+        } = surface;
+        let is_known: Vec<bool> = vertices_m
+            .iter()
+            .map(|at| !self.is_seen(at) && is_modelled(at))
             .collect();
-        (!triangles.is_empty()).then(|| UnseenBody {
-            faces: SurfaceIndex::new(TriangleMesh {
-                vertices_m,
-                triangles,
-            }),
-            reaches,
-        })
+        let mut found = Vec::new();
+        for end in &self.ends {
+            let depth_m = |corner: u32| end.depth_m(&vertices_m[corner as usize]);
+            let is_cut = |corners: &&[u32; 3]| {
+                let mut behind = corners.iter().filter(|&&corner| depth_m(corner) < 0.0);
+                behind.any(|&corner| !is_known[corner as usize])
+            };
+            let cut = TriangleMesh {
+                triangles: triangles.iter().filter(is_cut).copied().collect(),
+                vertices_m: vertices_m.clone(),
+            };
+            for part in connected_parts(&cut) {
+                let corners = part.iter().map(|&face| cut.triangles[face]);
+                let corners = corners.map(|face| face.map(|corner| vertices_m[corner as usize]));
+                let behind = corners.flat_map(|face| end.behind(&face));
+                found.extend(hull(&self.extruded(end, behind)));
+            }
+        }
+        let solid = |(index, hull): (usize, ConvexMesh)| Solid {
+            name: format!("unseen_{}", index + 1),
+            shape: Shape::Convex(Arc::new(hull)),
+            parent_from_shape: Pose::identity(),
+        };
+        found.into_iter().enumerate().map(solid).collect()
     }
+
+    /// Points on an end or behind it, and how far the body goes on from them along the normals of all that they are behind.
+    fn extruded(
+        &self,
+        own: &ScanEnd,
+        points: impl Iterator<Item = Point3<f64>>,
+    ) -> Vec<Point3<f64>> {
+        let mut all = Vec::new();
+        for point in points {
+            let is_behind = |end: &&ScanEnd| *end == own || end.depth_m(&point) < 0.0;
+            let ends = self.ends.iter().filter(is_behind);
+            all.extend(ends.map(|end| point + GOES_ON_M * end.normal.into_inner()));
+            all.push(point);
+        }
+        all
+    }
+}
+
+impl ScanEnd {
+    /// How far a point is before the plane, m; negative behind it.
+    fn depth_m(&self, point: &Point3<f64>) -> f64 {
+        self.offset_m - self.normal.dot(&point.coords)
+    }
+
+    /// Corners of the part of a triangle that is behind the plane.
+    fn behind(&self, triangle: &[Point3<f64>; 3]) -> Vec<Point3<f64>> {
+        let mut corners = Vec::with_capacity(4);
+        for (at, corner) in triangle.iter().enumerate() {
+            let next = &triangle[(at + 1) % 3];
+            let [here_m, there_m] = [corner, next].map(|each| self.depth_m(each));
+            if here_m < 0.0 {
+                corners.push(*corner);
+            }
+            if (here_m < 0.0) != (there_m < 0.0) {
+                corners.push(corner + (next - corner) * (here_m / (here_m - there_m)));
+            }
+        }
+        corners
+    }
+}
+
+/// The hull of points; of such as lie in a plane, that of boxes about them.
+fn hull(points: &[Point3<f64>]) -> Option<ConvexMesh> {
+    let thick = || {
+        let corners = (0..8).map(|corner| {
+            Vector3::from_fn(|axis, _| {
+                if corner >> axis & 1 == 0 {
+                    LEFT_OUT_M
+                } else {
+                    -LEFT_OUT_M
+                }
+            })
+        });
+        let corners: Vec<Vector3<f64>> = corners.collect();
+        let points = points.iter();
+        let all = points.flat_map(|point| corners.iter().map(move |corner| point + corner));
+        let all: Vec<Point3<f64>> = all.collect();
+        simplified_hull(&all, LEFT_OUT_M).ok()
+    };
+    simplified_hull(points, LEFT_OUT_M).ok().or_else(thick)
 }

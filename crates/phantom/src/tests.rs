@@ -596,12 +596,12 @@ fn volumes_are_as_documented() {
     }
 }
 
-/// The unseen is what lies beyond the plane, and straight behind it: distances by hand.
+/// The unseen is what lies behind the plane, straight behind the face: distances by hand.
 #[test]
 fn a_cut_body_may_go_on_behind_its_cut() {
     let whole = Phantom::build(&Phantom::size_preset("male-p50-supine").unwrap()).unwrap();
     assert!(whole.is_skin_seen(&Point3::new(0.0, 0.0, 1.0)));
-    assert!(whole.unseen_body(|_| false).is_none());
+    assert!(whole.unseen_body(|_| false).is_empty());
     let half_m = 0.5e-3 * whole.parameters.as_ref().unwrap().length_mm;
     let cut = whole.with_scan_ends(vec![ScanEnd {
         normal: Vector3::z_axis(),
@@ -609,22 +609,41 @@ fn a_cut_body_may_go_on_behind_its_cut() {
     }]);
     assert!(cut.is_skin_seen(&Point3::new(0.0, 0.0, half_m - 6e-3)));
     assert!(!cut.is_skin_seen(&Point3::new(0.0, 0.0, half_m - 4e-3)));
-    assert!(cut.unseen_body(|_| true).is_none());
-    let unseen = cut.unseen_body(|_| false).unwrap();
+    assert!(cut.unseen_body(|_| true).is_empty());
+    let unseen = cut.unseen_body(|_| false);
+    let [unseen] = &unseen[..] else {
+        panic!("one face, {} solids", unseen.len())
+    };
+    let faces = HalfSpaces::of(unseen).unwrap();
     for (place, wanted_m) in [
-        // On the face, before it, and straight behind it at any distance.
-        ([0.0, 0.0, half_m], 0.0),
-        ([0.0, 0.0, half_m - 0.1], 0.1),
-        ([0.0, 0.0, half_m + 0.4], 0.0),
+        // On the plane, between the skin's vertices; before it; and behind the end of what may be.
+        ([0.0, 0.0, half_m - 5e-3], 0.0),
+        ([0.0, 0.0, half_m - 0.1], -0.095),
+        ([0.0, 0.0, half_m + 3.1], -0.1),
     ] {
-        let distance_m = unseen.distance_m(&Point3::from(place));
+        let depth_m = faces.depth_m(&Point3::from(place));
         assert!(
-            (distance_m - wanted_m).abs() < ROUNDING_M,
-            "{place:?} {distance_m}"
+            (depth_m - wanted_m).abs() < ROUNDING_M,
+            "{place:?} {depth_m}"
         );
     }
-    // Beside what lies behind it: as far as from the face's rim.
-    let beside = |z: f64| unseen.distance_m(&Point3::new(0.5, 0.0, z));
-    assert!((beside(half_m + 0.4) - beside(half_m)).abs() < ROUNDING_M);
-    assert!(beside(half_m) > 0.2);
+    // As wide as the skin at the end, however far behind it; a hull leaves out 0.5 mm.
+    let skin = cut.skin().shape.surface(0.0).vertices_m;
+    let at_end: Vec<_> = skin.iter().filter(|at| at.z > half_m - 5e-3).collect();
+    assert!(at_end.len() > 20);
+    let widest_m = at_end.iter().map(|at| at.x).fold(0.0, f64::max);
+    for behind_m in [0.3, 1.0, 2.5] {
+        let behind = Vector3::new(0.0, 0.0, behind_m);
+        for at in &at_end {
+            assert!(faces.depth_m(&(*at + behind)) > -6e-4);
+        }
+        for beside_m in [0.02, 0.2] {
+            let beside = Point3::new(widest_m + beside_m, 0.0, half_m + behind_m);
+            let distance_m = -faces.depth_m(&beside);
+            assert!(
+                (beside_m - distance_m).abs() < 2e-3,
+                "{beside_m} {distance_m}"
+            );
+        }
+    }
 }

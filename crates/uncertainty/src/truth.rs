@@ -456,6 +456,9 @@ impl Truth {
                 }
             }
         }
+        for solid in &mut real.behind_cuts {
+            solid.parent_from_shape = moved * solid.parent_from_shape;
+        }
         real
     }
 

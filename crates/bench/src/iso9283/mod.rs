@@ -2,18 +2,20 @@
 
 mod simulate;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
+use needlebench_cell::UNSEEN_BODY;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
 use needlebench_evaluation::iso9283::{
     EngineMeasurement, Iso9283Report, ProtocolSummary, SUBJECT, StabilisationReport, judge,
 };
 use needlebench_evaluation::report::{
-    CriterionResult, EngineFailure, Report, SCHEMA_VERSION, ScenarioSummary, Verdict,
+    ClearanceReport, CriterionResult, EngineFailure, NotJudged, Report, SCHEMA_VERSION,
+    ScenarioSummary, Verdict,
 };
-use needlebench_evaluation::{EngineDifference, pairs};
+use needlebench_evaluation::{EngineDifference, pairs, planned_clearance};
 use needlebench_iso9283::{Commanded, drift, evaluate};
 use needlebench_parallel::in_parallel;
 use needlebench_planning::iso9283::{ProtocolError, ProtocolPlan};
@@ -92,7 +94,10 @@ pub(crate) fn run(
         .as_ref()
         .expect("a resolved protocol has its section")
         .criteria;
-    let judged = judge(&report, own, &scenario.criteria, &chosen);
+    let mut judged = judge(&report, own, &scenario.criteria, &chosen);
+    judged
+        .not_judged
+        .extend(open_at_cuts(resolved, &model, plan));
     let interrupted = control.is_cancelled();
     Ok(ScenarioRun {
         events: Vec::new(),
@@ -120,6 +125,36 @@ pub(crate) fn run(
         interrupted,
         real_arm: RealArm::of(setup.real.cell()),
     })
+}
+
+/// Clearances of the cycles that are not known, since the patient may be nearer behind the cuts of its scan.
+fn open_at_cuts(
+    resolved: &ResolvedScenario,
+    model: &ClearanceModel,
+    plan: &ProtocolPlan,
+) -> Vec<NotJudged> {
+    let cell = &resolved.cell;
+    if cell.behind_cuts.is_empty() {
+        return Vec::new();
+    }
+    let tolerance_m = resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
+    let cycles = plan.directional.iter().chain([&plan.cycle]);
+    let unknown: BTreeSet<&str> = cycles
+        .flat_map(|cycle| {
+            let minima = planned_clearance(cell, model, &cycle.trajectory, tolerance_m);
+            let unknown: Vec<&str> = ClearanceReport::of(&minima).unknown().collect();
+            unknown
+        })
+        .collect();
+    let open = unknown.into_iter().map(|class| NotJudged {
+        goal: SUBJECT.to_owned(),
+        label: None,
+        engine: None,
+        criterion: format!("min_clearance_mm.{class}"),
+        reason: UNSEEN_BODY.to_owned(),
+        requirement: None,
+    });
+    open.collect()
 }
 
 /// Every engine's cycles, or why there are none.

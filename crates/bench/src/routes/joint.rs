@@ -2,7 +2,7 @@
 
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::Servo;
-use needlebench_evaluation::first_missed_by_posture;
+use needlebench_evaluation::judge_posture;
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_evaluation::room::RoomModel;
 use needlebench_kinematics::ik::Configuration;
@@ -210,17 +210,18 @@ fn with_robot<T>(
     then(&robot, placed)
 }
 
-/// The first criterion on clearances that a posture misses.
-fn missed_criterion(resolved: &ResolvedScenario, candidate: &Candidate) -> Option<&'static str> {
+/// The first criterion on clearances that a posture misses, or why one is not evaluated.
+fn fault(resolved: &ResolvedScenario, candidate: &Candidate) -> Option<String> {
     let mut posture = ConfigurationReport::new("");
     set_clearances(&mut posture, &candidate.clearance);
-    first_missed_by_posture(&posture, &resolved.scenario.criteria)
+    let fault = judge_posture(&posture, &resolved.scenario.criteria)?;
+    Some(fault.into_detail().into_owned())
 }
 
 /// Whether a posture meets the scenario's criteria on clearances.
 pub(super) fn meets_criteria(resolved: &ResolvedScenario, member: &Member) -> bool {
     let candidate = member.candidate.as_ref();
-    candidate.is_some_and(|candidate| missed_criterion(resolved, candidate).is_none())
+    candidate.is_some_and(|candidate| fault(resolved, candidate).is_none())
 }
 
 struct Robot<'a> {
@@ -266,9 +267,7 @@ impl Robot<'_> {
         let candidate = member.candidate.as_ref();
         let reason = match member.rejections.first() {
             Some(rejection) => Some(rejection.rule.name().to_owned()),
-            None => candidate
-                .and_then(|candidate| missed_criterion(self.resolved, candidate))
-                .map(str::to_owned),
+            None => candidate.and_then(|candidate| fault(self.resolved, candidate)),
         };
         let aim = self.resolved.scenario.planning.roll_aim;
         let limits = self.planner.limits();

@@ -234,21 +234,21 @@ impl<'a> Case<'a> {
 
 /// The first criterion that a configuration fails, or else that could not be evaluated.
 fn missed(judged: &Judged, label: &str) -> (Outcome, Cow<'static, str>) {
-    let counts = |of: Option<&str>, criterion: &str| of == Some(label) && criterion != "expected";
+    let counts = |of: &Option<String>, criterion: &str| {
+        of.as_deref() == Some(label) && criterion != "expected"
+    };
     let missed = judged
         .results
         .iter()
-        .filter(|result| !result.pass)
-        .map(|each| (Outcome::Failed, each.label.as_deref(), &each.criterion));
+        .filter(|each| !each.pass && counts(&each.label, &each.criterion))
+        .map(|each| (Outcome::Failed, each.criterion.clone()));
     let unjudged = judged
         .not_judged
         .iter()
-        .map(|each| (Outcome::NotJudged, each.label.as_deref(), &each.criterion));
-    missed
-        .chain(unjudged)
-        .find(|(_, of, criterion)| counts(*of, criterion))
-        .map_or(
-            (Outcome::NotJudged, "no_engine".into()),
-            |(outcome, _, criterion)| (outcome, criterion.clone().into()),
-        )
+        .filter(|each| counts(&each.label, &each.criterion))
+        .map(|each| (Outcome::NotJudged, each.detail()));
+    missed.chain(unjudged).next().map_or(
+        (Outcome::NotJudged, "no_engine".into()),
+        |(outcome, detail)| (outcome, detail.into()),
+    )
 }

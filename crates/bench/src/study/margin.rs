@@ -1,6 +1,7 @@
 //! The constraint margin of a posture: searches compare base placements and tools by it.
 
 use needlebench_cell::{ClearanceClass, Rule};
+use needlebench_clearance::CUT_MARGIN_M;
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_evaluation::worst_miss_by_posture_m;
 use needlebench_planning::{Member, Planner};
@@ -80,6 +81,12 @@ pub(super) fn margin_m(
         if counted.counts(pair.class) || room < 0.0 {
             least = least.min(room);
         }
+    }
+    for class in posture.unknown_clearances() {
+        // By how much the body behind a cut would have to be farther for the clearance to be known.
+        let known_m = posture.posture_clearance_m[class].max(0.0) + CUT_MARGIN_M;
+        let behind_cuts_m = posture.posture_behind_cuts_m.get(class);
+        least = least.min(behind_cuts_m.copied().unwrap_or_default() - known_m);
     }
     let class = ClearanceClass::NeedleRoute;
     let criteria = &resolved.scenario.criteria;

@@ -106,7 +106,7 @@ fn missed(
     let missed = judged.results.into_iter().find(|result| !result.pass);
     let unjudged = judged.not_judged.into_iter().next();
     let missed = missed.map(|result| (Outcome::Failed, result.criterion.into()));
-    missed.or(unjudged.map(|each| (Outcome::NotJudged, each.criterion.into())))
+    missed.or(unjudged.map(|each| (Outcome::NotJudged, each.detail().into())))
 }
 
 /// One row of each configuration.

@@ -97,9 +97,15 @@ impl StudyColumns {
     pub fn row(&self, index: usize, case: &CaseRow) -> Row {
         let index = u8::try_from(index).expect("there are eight");
         let row = Row::new(index, case.outcome, case.detail.clone());
+        let worst = case.measured.at_worst();
+        let is_known = |key: &MetricKey, value: f64| {
+            let worst = worst.as_ref().map(|worst| key.read_column(worst));
+            worst.is_none_or(|worst| worst == Some(value))
+        };
         let of_metrics = self.keys.iter().map(|key| {
-            let known = key.is_measured_in(case.mode);
-            known.then(|| key.read_column(&case.measured)).flatten()
+            let is_measured = key.is_measured_in(case.mode);
+            let value = is_measured.then(|| key.read_column(&case.measured))?;
+            value.filter(|value| is_known(key, *value))
         });
         let margin = self
             .has_margin

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use needlebench_cell::ClearanceClass;
 use needlebench_clearance::{ClassMinima, ClearanceModel};
-use needlebench_evaluation::first_missed_by_posture;
 use needlebench_evaluation::report::ConfigurationReport;
+use needlebench_evaluation::{PostureFault, judge_posture};
 use needlebench_input::{Finding, nothing_serves};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::{Configuration, Kinematics};
@@ -167,7 +167,7 @@ impl StaticWorker {
             broken_rule(&rejections).or_else(|| {
                 let mut posture = ConfigurationReport::new("");
                 set_clearances(&mut posture, &clearance);
-                first_missed_by_posture(&posture, &resolved.scenario.criteria).map(Cow::from)
+                judge_posture(&posture, &resolved.scenario.criteria).map(PostureFault::into_detail)
             })
         })
     }
@@ -263,10 +263,13 @@ fn row(
     posture.predicted = predicted.needle;
     posture.budget = predicted.budget;
     if outcome == Outcome::Ok
-        && let Some(missed) = first_missed_by_posture(posture, &resolved.scenario.criteria)
+        && let Some(fault) = judge_posture(posture, &resolved.scenario.criteria)
     {
-        row.outcome = Outcome::Failed;
-        row.detail = missed.into();
+        row.outcome = match fault {
+            PostureFault::Missed(_) => Outcome::Failed,
+            PostureFault::NotJudged(_) => Outcome::NotJudged,
+        };
+        row.detail = fault.into_detail();
     }
     let is_ok = row.outcome == Outcome::Ok;
     let margin_m = margin_m(planner, resolved, member, &row.measured, counted, is_ok);
@@ -274,8 +277,13 @@ fn row(
     row
 }
 
-/// The least clearance of each class.
+/// The least clearance of each class, and what may be nearer behind the cuts of the patient's scan.
 pub(crate) fn set_clearances(posture: &mut ConfigurationReport, minima: &ClassMinima) {
+    let behind = minima.iter().filter_map(|pair| {
+        let behind_cuts_m = minima.behind_cuts_m(pair.class)?;
+        Some((pair.class.name(), behind_cuts_m))
+    });
+    posture.posture_behind_cuts_m.extend(behind);
     let found = minima.iter();
     posture
         .posture_clearance_m

@@ -24,6 +24,7 @@ fn clearance(minimum_m: f64, certified_lower_bound_m: Option<f64>) -> ClassClear
         minimum_m,
         certified_lower_bound_m,
         breath_allowance_m: None,
+        behind_cuts_m: None,
         pair: ["forearm.2".into(), "skin".into()],
         witness_points_m: [[0.0; 3], [minimum_m, 0.0, 0.0]],
         phase: "transfer",

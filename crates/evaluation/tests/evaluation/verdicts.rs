@@ -21,6 +21,7 @@ fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationRe
         minimum_m: clearance_m,
         certified_lower_bound_m: None,
         breath_allowance_m: None,
+        behind_cuts_m: None,
         pair: ["forearm.2".into(), "skin".into()],
         witness_points_m: [[0.0; 3], [clearance_m, 0.0, 0.0]],
         phase: "transfer",

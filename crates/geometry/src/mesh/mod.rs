@@ -26,4 +26,4 @@ pub use stl::{is_lfs_pointer, read_stl};
 pub use surface_index::SurfaceIndex;
 
 pub use crate::measure::{area_m2, centroid_m, extent_m, size_m, volume_m3};
-pub use crate::topology::weld;
+pub use crate::topology::{connected_parts, weld};

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use needlebench_bench::Preview;
 use needlebench_bench::preview::BASIS;
-use needlebench_cell::{part_in_words, reason_in_words};
+use needlebench_cell::{UNSEEN_BODY, part_in_words, reason_in_words};
 use needlebench_input::{Finding, nothing_serves};
 use needlebench_report::table::{fissures_in_words, rejected_in_words, route_in_words};
 use needlebench_scenario::ResolvedScenario;
@@ -181,7 +181,12 @@ fn in_words(
         }
         let by_criteria = rejected.filter(|each| each.rejections.is_empty());
         let mut missed: Vec<(&str, Vec<&str>)> = Vec::new();
+        let mut open = Vec::new();
         for each in by_criteria {
+            if each.not_judged.is_some() {
+                open.push(each.label);
+                continue;
+            }
             let criterion = each.missed.unwrap_or("a criterion failed");
             match missed.iter_mut().find(|(known, _)| *known == criterion) {
                 Some((_, labels)) => labels.push(each.label),
@@ -191,6 +196,13 @@ fn in_words(
         for (criterion, labels) in missed {
             let reason = reason_in_words(criterion);
             write!(text, "\n    {reason} ({criterion}): {}", labels.join(", "))?;
+        }
+        if !open.is_empty() {
+            write!(
+                text,
+                "\n    not evaluated: {UNSEEN_BODY}: {}",
+                open.join(", ")
+            )?;
         }
         if let Some(route) = &goal.needle_route {
             let wanted_mm = resolved.scenario.criteria.min_clearance_mm.needle_route;

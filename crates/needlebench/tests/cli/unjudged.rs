@@ -269,25 +269,95 @@ fn cut_at(bench: &Bench, normal: &str, offset_mm: u32) {
     bench.write("s.toml", format!("{SMALL}{cut}"));
 }
 
+/// Labels of the configurations of a run's goal that are not rejected, with the number of criteria not evaluated.
+fn moved(report: &Value) -> Vec<(&str, u64)> {
+    let configurations = report["goals"][0]["configurations"].list().iter();
+    let moved = configurations.filter(|each| each["status"] != "rejected");
+    moved
+        .map(|each| (each["label"].word(), each["not_judged"].as_u64().unwrap()))
+        .collect()
+}
+
+/// Why a clearance is not evaluated, everywhere in these words.
+const UNSEEN: &str = "where the scan ends, the unseen body may be nearer";
+
 #[test]
 fn clearances_near_a_cut_of_the_scan_are_left_open() {
     let bench = Bench::with_scenario(SMALL);
     // What is highest of the chest, under the tool, was not seen.
-    cut_at(&bench, "[0.0, -1.0, 0.0]", 100);
+    cut_at(&bench, "[0.0, -1.0, 0.0]", 60);
     let report = bench
         .run("run s.toml --engine rapier --json")
         .exits_with(1)
         .json();
     assert_eq!(report["verdict"], "incomplete");
+    assert!(report["goals"][0]["recommended"].is_null());
+    assert!(moved(&report).iter().all(|(_, open)| *open > 0));
     let open = report["not_judged"].list();
-    assert!(!open.is_empty());
-    for each in open {
-        holds(each["criterion"].word(), ["min_clearance_mm.", "_phantom"]);
-        holds(each["reason"].word(), ["scan ends"]);
+    let (of_goal, of_configurations): (Vec<&Value>, Vec<&Value>) =
+        open.iter().partition(|each| each["label"].is_null());
+    assert_eq!(of_goal.len(), 1);
+    holds(
+        of_goal[0]["criterion"].word(),
+        ["min_working_configurations"],
+    );
+    assert!(!of_configurations.is_empty());
+    for each in of_configurations {
+        holds(each["criterion"].word(), ["min_clearance_mm."]);
+        assert_eq!(each["reason"], UNSEEN);
     }
+    let answer = bench.run("run s.toml --engine rapier").exits_with(1);
+    holds(&answer.stdout, ["INCOMPLETE", "not evaluated", UNSEEN]);
+    // Before any motion, too.
+    let answer = bench.run("check s.toml").exits_with(1);
+    holds(
+        &answer.stdout,
+        ["0 of 8 configurations feasible", "not evaluated", UNSEEN],
+    );
     // The patient's left side is far from all that moves.
     cut_at(&bench, "[1.0, 0.0, 0.0]", 100);
     bench.run("run s.toml --engine rapier").exits_with(0);
+    bench.run("check s.toml").exits_with(0);
+}
+
+#[test]
+fn what_is_open_near_a_cut_is_not_recommended() {
+    let bench = Bench::with_scenario(SMALL);
+    cut_at(&bench, "[0.0, -1.0, 0.0]", 80);
+    let report = bench
+        .run("run s.toml --engine rapier --json")
+        .exits_with(1)
+        .json();
+    let moved = moved(&report);
+    let known: Vec<&str> = moved
+        .iter()
+        .filter_map(|(label, open)| (*open == 0).then_some(*label))
+        .collect();
+    assert!(!known.is_empty() && known.len() < moved.len(), "{moved:?}");
+    let goal = &report["goals"][0];
+    let order = goal["ranking"]["order"].list().iter();
+    assert!(order.map(Json::word).all(|label| known.contains(&label)));
+    assert!(known.contains(&goal["recommended"]["label"].word()));
+    // A study's rows of the same, in each mode that needs no engine: what is open is no success.
+    for mode in ["static", "planned"] {
+        bench.write(
+            "study.toml",
+            format!(
+                "name = \"{mode}\"\nscenario = \"s.toml\"\nmode = \"{mode}\"\nseed = 1\n[sampling]\nsamples = 1\n\
+                 [[factors]]\nname = \"along\"\nkey = \"phantom.position_mm[0]\"\nrange = [-0.001, 0.001]\n\
+                 relative = true\n"
+            ),
+        );
+        let study = bench
+            .run("study study.toml --json --quiet --no-page")
+            .json();
+        let rows = study["statistics"]["overall"]["configurations"].list();
+        let count = |key: &str| -> u64 { rows.iter().map(|row| row[key].as_u64().unwrap()).sum() };
+        assert!(count("not_judged") > 0, "{mode}");
+        assert!(count("ok") > 0 && count("ok") + count("not_judged") == moved.len() as u64);
+        let details = study["statistics"].to_string();
+        holds(&details, ["scan_ends "]);
+    }
 }
 
 #[test]

@@ -8,6 +8,7 @@ use needlebench_bench::progress::Progress;
 use needlebench_bench::study::{
     ENGINE_FAILURE, PreparedStudy, Replanned, RobustnessResult, StudyCase, robustness_of,
 };
+use needlebench_cell::{SCAN_ENDS, reason_in_words};
 use needlebench_evaluation::report::Verdict;
 use needlebench_scenario::requirements::{Requirements, requirement_of};
 use needlebench_show::blocks_text;
@@ -264,6 +265,9 @@ fn not_judged(statistics: &Summary, criteria: &[CriterionResult]) -> Vec<String>
         format!("{engine} could not execute {count} motions (no measurements)")
     }));
     reasons.extend(criteria.into_iter().map(|(criterion, count)| {
+        if criterion.starts_with(SCAN_ENDS) {
+            return format!("{} for {count} configurations", reason_in_words(criterion));
+        }
         format!("scenario criterion {criterion} not evaluated for {count} configurations")
     }));
     reasons

@@ -584,6 +584,9 @@ pub(crate) fn resolve(
         Joints::from_column_slice(&servo.armature_kgm2),
         gravity.world(),
     );
+    let behind_cuts = phantom.as_ref().zip(lying.as_deref());
+    let behind_cuts = behind_cuts.map(|(placed, lying)| lying.behind_cuts(placed));
+    let cell = cell.with_behind_cuts(behind_cuts.unwrap_or_default());
     Ok(ResolvedScenario {
         scenario,
         source,

@@ -109,7 +109,7 @@ pub struct BuildSection {
 }
 
 /// A plane at which a scan ends. The surface beyond it is the cut through the body and no skin: nothing enters there, and
-/// a clearance that the unseen body behind it may undercut is not evaluated.
+/// a clearance is not evaluated where the unseen body may be nearer, which is assumed to go straight on behind the cut.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CutSection {

@@ -52,7 +52,8 @@ impl<'a> Proofs<'a> {
         let (placed, [goal]) = (resolved.phantom.as_ref()?, &resolved.goals[..]) else {
             return None;
         };
-        if resolved.imperfections.is_some() {
+        // Behind the cuts of a scan distances prove nothing.
+        if resolved.imperfections.is_some() || !resolved.cell.behind_cuts.is_empty() {
             return None;
         }
         let planner = Planner::new(resolved, model).ok()?;

@@ -8,10 +8,12 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
-use needlebench_geometry::{Placement, PreparedShape};
+use needlebench_geometry::{Placement, PreparedShape, Shape, Solid, separation};
 use needlebench_input::{Finding, Location, ModelSource, TomlText, nearest_name, source_of};
 use needlebench_kinematics::Pose;
-use needlebench_phantom::{PARAMETERS, Phantom, PhantomError, PhantomParameters, ScanEnd};
+use needlebench_phantom::{
+    PARAMETERS, Phantom, PhantomError, PhantomParameters, PhantomPart, ScanEnd,
+};
 
 use super::cache::Cache;
 use crate::scenario::{NO_MODEL, PhantomSection};
@@ -39,7 +41,12 @@ pub(crate) struct UnplacedPhantom {
     lowest_m: Cache<Vector3<f64>, f64>,
     /// A ball about the skin, phantom frame.
     ball: OnceLock<(Vector3<f64>, f64)>,
+    /// Where the body may go on behind the cuts of its scan beside such limbs, phantom frame.
+    behind_cuts: Cache<Vec<PhantomPart>, Vec<Solid>>,
 }
+
+/// A cut is that of a limb of the model within this, m (assumed: what limbs of people differ by).
+const SAME_LIMB_M: f64 = 0.01;
 
 /// Lowest and highest corner of a box.
 pub(super) type Corners = (Point3<f64>, Point3<f64>);
@@ -87,6 +94,22 @@ impl UnplacedPhantom {
         *lowest_m.unwrap_or_else(|never| match never {})
     }
 
+    /// Where the body may go on behind the cuts of its scan, beside the limbs of a placed one; world.
+    pub fn behind_cuts(&self, placed: &PlacedPhantom) -> Vec<Solid> {
+        if !self.phantom.has_scan_ends() {
+            return Vec::new();
+        }
+        let solids = self.behind_cuts.get(
+            |limbs| *limbs == placed.limbs,
+            || {
+                let made = self.phantom.unseen_body(is_limb(&placed.limbs));
+                Ok::<_, std::convert::Infallible>((placed.limbs.clone(), made))
+            },
+        );
+        let solids = solids.unwrap_or_else(|never| match never {});
+        needlebench_cell::placed(&solids, &placed.world_from_phantom)
+    }
+
     /// Most that a point of the skin moves from one place of the phantom to another, m.
     pub fn travel_m(&self, from: &Placement, to: &Placement) -> f64 {
         let (centre, radius_m) = self.ball.get_or_init(|| {
@@ -96,6 +119,27 @@ impl UnplacedPhantom {
             (centre, distances_m.fold(0.0, f64::max))
         });
         from.travel_m(to, centre, *radius_m)
+    }
+}
+
+/// Whether a point (phantom frame) is in a limb.
+fn is_limb(limbs: &[PhantomPart]) -> impl Fn(&Point3<f64>) -> bool {
+    let prepared = |limb: &PhantomPart| {
+        let Solid {
+            shape,
+            parent_from_shape,
+            ..
+        } = &limb.solid;
+        (PreparedShape::new(shape), *parent_from_shape)
+    };
+    let limbs: Vec<(PreparedShape, Pose)> = limbs.iter().map(prepared).collect();
+    let ball = PreparedShape::new(&Shape::Sphere {
+        radius_m: SAME_LIMB_M,
+    });
+    move |at| {
+        let at = Pose::from_parts((*at).into(), UnitQuaternion::identity());
+        let mut limbs = limbs.iter();
+        limbs.any(|(limb, place)| separation(&ball, &at, limb, place).distance_m <= 0.0)
     }
 }
 
@@ -142,6 +186,7 @@ pub(super) fn scenario_phantom(
         turned: Cache::default(),
         lowest_m: Cache::default(),
         ball: OnceLock::new(),
+        behind_cuts: Cache::default(),
     })
 }
 
