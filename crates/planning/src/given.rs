@@ -106,7 +106,7 @@ impl Planner<'_> {
                 joints: held.joints,
                 residual_m: held.off_m,
                 residual_rad: held.off_rad,
-                ..nearest.solution.clone()
+                ..nearest.solution
             };
             rejections.extend(self.joint_rules(&solution));
             let mut candidate = self.with_clearance(held.roll_rad, &solution, &clearance);

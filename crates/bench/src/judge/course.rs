@@ -133,7 +133,7 @@ impl<'a> Course<'a> {
     }
 
     /// A point as an error names it.
-    pub fn finding(&self, point: usize, message: String) -> Finding {
+    pub fn finding(&self, point: usize, message: &str) -> Finding {
         let line = self.file.lines.get(point).copied();
         Finding {
             line,
@@ -158,7 +158,7 @@ impl<'a> Course<'a> {
                         JOINT_NAMES[joint], step[joint], step_s
                     );
                     let hint = "are points missing, or 2π added?";
-                    let finding = self.finding(point, message).key(JOINT_NAMES[joint]);
+                    let finding = self.finding(point, &message).key(JOINT_NAMES[joint]);
                     return Err(finding.hint(hint));
                 }
             }

@@ -212,7 +212,7 @@ fn begin(
     }
     let hint =
         "judge it from where it begins with --start as-is, or set start.joints_deg in the scenario";
-    Err(course.finding(0, off).key("start.joints_deg").hint(hint))
+    Err(course.finding(0, &off).key("start.joints_deg").hint(hint))
 }
 
 /// Where the motion holds: its standstills, and its end, that are at a goal; or the one nearest to the goal that is
@@ -286,7 +286,7 @@ fn holds(
             AT_GOAL_RAD.to_degrees()
         );
         return Err(course
-            .finding(best.points.end, message)
+            .finding(best.points.end, &message)
             .key("--goal")
             .hint(hint));
     }
@@ -303,7 +303,7 @@ fn holds(
                 course.times_s[hold.points.start]
             );
             let hint = "judge what follows by itself: cut the file, or name the goal with --goal";
-            return Err(course.finding(hold.points.start, message).hint(hint));
+            return Err(course.finding(hold.points.start, &message).hint(hint));
         }
         found.push(hold);
     }
@@ -533,10 +533,14 @@ fn add_criteria(report: &mut Report, planner: &Planner<'_>, motion: &JudgedRepor
                 ),
             ));
         }
+        // Of what a scan's unseen body may undercut nothing is said but that it fails.
+        let open: Vec<&str> = configuration.retreat_clearance.unknown().collect();
         for (class, lower_bound_m) in &hold.afterwards_m {
+            let is_open = open.contains(class);
             let class = ClearanceClass::named(class).expect("reports name classes");
             let limit_m = planner.limits().get(class).judged_m;
-            if !class.is_physical() || !limit_m.is_finite() {
+            let is_kept = *lower_bound_m >= limit_m;
+            if is_open && is_kept || !class.is_physical() || !limit_m.is_finite() {
                 continue;
             }
             all.push(result(
@@ -544,7 +548,7 @@ fn add_criteria(report: &mut Report, planner: &Planner<'_>, motion: &JudgedRepor
                 lower_bound_m * 1e3,
                 limit_m * 1e3,
                 "mm",
-                *lower_bound_m >= limit_m,
+                is_kept,
                 "after the hold, certified as planned".to_owned(),
             ));
         }

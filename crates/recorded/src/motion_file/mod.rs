@@ -261,13 +261,9 @@ impl Points {
 /// Lines of places in ascending order, from 1.
 fn lines_of(text: &str, places: &[usize]) -> Vec<usize> {
     let (mut line, mut from) = (1, 0);
-    let bytes = text.as_bytes();
     let lines = places.iter().map(|&place| {
-        let place = place.clamp(from, bytes.len());
-        line += bytes[from..place]
-            .iter()
-            .filter(|byte| **byte == b'\n')
-            .count();
+        let place = place.clamp(from, text.len());
+        line += text[from..place].matches('\n').count();
         from = place;
         line
     });
