@@ -69,17 +69,17 @@ fn line(needle: &ScanNeedle) -> Value {
         point("target", &target_words(needle), &needle.target_m),
     ];
     let display = json!({ "propertiesLabelVisibility": true, "pointLabelsVisibility": false });
-    let mut markup = markup("Line", &needle.goal, points, display);
+    let mut markup = markup("Line", &needle.goal, points, &display);
     markup["fixedNumberOfControlPoints"] = json!(true);
     markup
 }
 
 fn list(name: &str, points: Vec<Value>) -> Value {
     let display = json!({ "propertiesLabelVisibility": false, "pointLabelsVisibility": true });
-    markup("Fiducial", name, points, display)
+    markup("Fiducial", name, points, &display)
 }
 
-fn markup(kind: &str, name: &str, mut points: Vec<Value>, display: Value) -> Value {
+fn markup(kind: &str, name: &str, mut points: Vec<Value>, display: &Value) -> Value {
     for (index, point) in points.iter_mut().enumerate() {
         point["id"] = json!((index + 1).to_string());
     }

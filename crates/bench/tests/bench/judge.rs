@@ -39,7 +39,7 @@ fn planned() -> (ResolvedScenario, ConfigurationPlan) {
 
 /// A motion by its points every 10 ms, and at the ends of its phases.
 fn points(motion: &JointTrajectory) -> (Vec<f64>, Vec<JointState>) {
-    let mut times_s: Vec<f64> = (0..)
+    let mut times_s: Vec<f64> = (0..100_000)
         .map(|k| 0.01 * f64::from(k))
         .take_while(|time_s| *time_s < motion.duration_s())
         .collect();

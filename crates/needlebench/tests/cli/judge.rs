@@ -26,7 +26,7 @@ const QUIET: &str = "--engine rapier --no-pictures --no-page --quiet --json";
 fn exported_motions_are_judged_as_the_plan_was() {
     let bench = bench();
     let run: Value = bench
-        .run(&format!("run table3.toml --out ran {QUIET}"))
+        .run(format!("run table3.toml --out ran {QUIET}"))
         .exits_with(0)
         .json();
     let label = run["goals"][0]["recommended"]["label"].word().to_owned();
@@ -38,7 +38,7 @@ fn exported_motions_are_judged_as_the_plan_was() {
     for extension in ["json", "yaml", "csv"] {
         let file = format!("out/table3/export/pose/{label}.trajectory.{extension}");
         let answer: Value = bench
-            .run(&format!(
+            .run(format!(
                 "judge table3.toml --motion {file} --out {extension} {QUIET}"
             ))
             .exits_with(0)
@@ -122,7 +122,7 @@ fn what_is_no_motion_of_this_scenario_is_refused() {
         ),
     ] {
         let answer = bench
-            .run(&format!("judge table3.toml {arguments}"))
+            .run(format!("judge table3.toml {arguments}"))
             .exits_with(2);
         answer.complains([said]);
     }
