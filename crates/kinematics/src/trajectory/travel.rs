@@ -263,7 +263,7 @@ mod tests {
         let parts = motion.phases().into_iter();
         parts.fold(start, |whole, (phase, start_s, end_s)| {
             let count = ((end_s - start_s) / 0.02).ceil();
-            let times_s: Vec<f64> = (0..)
+            let times_s: Vec<f64> = (0..10_000)
                 .map(f64::from)
                 .take_while(|k| *k <= count)
                 .map(|k| start_s + (end_s - start_s) * k / count)
