@@ -173,9 +173,9 @@ impl LimitPolicy {
     }
 
     /// Limits of an arm: positions from here, speeds from its user manual, torques from Universal
-    /// Robots, *Max. joint torques*, 2020.
+    /// Robots, *Max. joint torques*, 2020; of UR20 and UR30 both from `ur_description` 2.4.5.
     ///
-    /// Of the latter `ur_description` deviates by up to 3 N m for some arms of the e-Series.
+    /// Of the torques `ur_description` deviates by up to 3 N m for some arms of the e-Series.
     pub fn limits_of(&self, model: UrModel) -> JointLimits {
         let (degrees_per_second, efforts_nm) = match model {
             UrModel::Ur3 | UrModel::Ur3e => (
@@ -186,6 +186,10 @@ impl LimitPolicy {
             UrModel::Ur10 | UrModel::Ur10e | UrModel::Ur16e => (
                 [120.0, 120.0, 180.0, 180.0, 180.0, 180.0],
                 [330.0, 330.0, 150.0, 56.0, 56.0, 56.0],
+            ),
+            UrModel::Ur20 | UrModel::Ur30 => (
+                [120.0, 120.0, 150.0, 210.0, 210.0, 210.0],
+                [738.0, 738.0, 433.0, 107.0, 107.0, 107.0],
             ),
         };
         JointLimits(std::array::from_fn(|i| JointLimit {

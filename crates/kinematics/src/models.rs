@@ -25,11 +25,15 @@ pub enum UrModel {
     Ur10e,
     /// UR16e.
     Ur16e,
+    /// UR20.
+    Ur20,
+    /// UR30.
+    Ur30,
 }
 
 impl UrModel {
     /// All of them, small arms first.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Ur3,
         Self::Ur3e,
         Self::Ur5,
@@ -37,6 +41,8 @@ impl UrModel {
         Self::Ur10,
         Self::Ur10e,
         Self::Ur16e,
+        Self::Ur20,
+        Self::Ur30,
     ];
 
     /// The manufacturer's name of the model: `UR3e`.
@@ -49,6 +55,8 @@ impl UrModel {
             Self::Ur10 => "UR10",
             Self::Ur10e => "UR10e",
             Self::Ur16e => "UR16e",
+            Self::Ur20 => "UR20",
+            Self::Ur30 => "UR30",
         }
     }
 
@@ -62,6 +70,8 @@ impl UrModel {
             Self::Ur10 => [0.1273, -0.612, -0.5723, 0.163941, 0.1157, 0.0922],
             Self::Ur10e => [0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655],
             Self::Ur16e => [0.1807, -0.4784, -0.36, 0.17415, 0.11985, 0.11655],
+            Self::Ur20 => [0.2363, -0.862, -0.7287, 0.201, 0.1593, 0.1543],
+            Self::Ur30 => [0.2363, -0.637, -0.5037, 0.201, 0.1593, 0.1543],
         };
         UrGeometry {
             d1,
@@ -83,7 +93,7 @@ impl UrModel {
             .map(|model| (model, deviation_m(model)))
             .into_iter()
             .min_by(|a, b| a.1.total_cmp(&b.1))
-            .expect("there are seven")
+            .expect("there are nine")
     }
 }
 
@@ -195,6 +205,8 @@ mod tests {
             (UrModel::Ur5e, 0.8172, 0.2329),
             (UrModel::Ur10, 1.1843, 0.256141),
             (UrModel::Ur16e, 0.8384, 0.2907),
+            (UrModel::Ur20, 1.5907, 0.3553),
+            (UrModel::Ur30, 1.1407, 0.3553),
         ] {
             let flange = model
                 .geometry()

@@ -55,7 +55,8 @@ pub(crate) struct UrdfArguments {
 /// A robot in place of the default one, for commands that need its kinematics only.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct ArmArguments {
-    /// A UR arm by name, with its nominal lengths: UR3, UR3e, UR5, UR5e, UR10, UR10e or UR16e.
+    /// A UR arm by name, with its nominal lengths: UR3, UR3e, UR5, UR5e, UR10, UR10e, UR16e, UR20
+    /// or UR30.
     #[arg(
         long,
         value_name = "MODEL",

@@ -255,7 +255,10 @@ fn exact_matrix_is_solved_like_its_vector() {
 fn every_arm_inverts_its_own_forward_kinematics() {
     let bench = Bench::new();
     let posture = "0.4,-1.3,1.5,-0.9,1.1,0.2";
-    for arm in ["UR3", "UR3e", "UR5", "UR5e", "UR10", "UR10e", "UR16e"] {
+    let arms = [
+        "UR3", "UR3e", "UR5", "UR5e", "UR10", "UR10e", "UR16e", "UR20", "UR30",
+    ];
+    for arm in arms {
         let pose = bench.run(format!("fk --arm {arm} --joints {posture} --json"));
         let pose = pose.exits_with(0).json();
         assert_eq!(pose["arm"], arm);
