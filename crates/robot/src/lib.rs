@@ -14,8 +14,8 @@ mod robot;
 pub use arm::{Arm, Recognition};
 pub use arm_in_use::{ArmInUse, ArmReport};
 pub use loaded::{
-    AppliedCalibration, LinkMember, LoadedRobot, LoadedTool, RobotDescription, STANDS_FOR_IT,
-    WITHOUT_SHAPE,
+    ASSUMED_SHAPES, AppliedCalibration, LinkMember, LoadedRobot, LoadedTool, RobotDescription,
+    STANDS_FOR_IT, WITHOUT_SHAPE,
 };
 pub use mesh_file::{MeshFormat, read_mesh};
 pub use robot::{

@@ -15,6 +15,9 @@ pub const WITHOUT_SHAPE: &str = "without a collision shape, as set in the scenar
 /// End of the note on a link that has no shapes of its own, or too small ones.
 pub const STANDS_FOR_IT: &str = " are added to it";
 
+/// Beginning of the note on an arm whose shapes were compared with no surface of it.
+pub const ASSUMED_SHAPES: &str = "assumed: the collision shapes of the ";
+
 /// A link of the URDF that a body of the arm was made of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LinkMember {

@@ -272,7 +272,7 @@ pub struct ServoData {
 #[serde(deny_unknown_fields)]
 pub struct RotorData {
     /// Rotor inertia per joint, reflected to the joint, kg m^2.
-    #[schemars(inner(range(min = 0.0, max = 10.0)))]
+    #[schemars(inner(range(min = 0.0, max = 50.0)))]
     pub inertia_kgm2: [f64; 6],
     /// A citation, or `assumed: ` and the reason.
     pub source: String,

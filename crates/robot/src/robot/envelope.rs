@@ -13,7 +13,7 @@ use super::enclosure::{
 };
 use super::rename_unique;
 use crate::LoadedRobot;
-use crate::{STANDS_FOR_IT, WITHOUT_SHAPE};
+use crate::{ASSUMED_SHAPES, Recognition, STANDS_FOR_IT, WITHOUT_SHAPE};
 
 /// Samples on the known envelope of a link, about.
 const SAMPLES: f64 = 600.0;
@@ -129,7 +129,28 @@ impl LoadedRobot {
                 .push(format!("{WITHOUT_SHAPE}{}", without.join(", ")));
         }
         self.robot.unseen = unseen;
+        self.note_assumed_enclosure();
         Ok(())
+    }
+
+    /// Says that shapes of the arm's own URDF are assumed, where the robot has any of them.
+    fn note_assumed_enclosure(&mut self) {
+        let Some(used) = &self.description.arm else {
+            return;
+        };
+        let notes = &mut self.description.notes;
+        let has_some = used.recognition == Recognition::Own
+            || notes.iter().any(|note| note.ends_with(STANDS_FOR_IT));
+        let data = &used.arm.data;
+        let source = data.enclosure.as_ref().map(|traced| &traced.source);
+        let reason = source.and_then(|source| source.strip_prefix("assumed:"));
+        if let Some(reason) = reason.filter(|_| has_some) {
+            notes.push(format!(
+                "{ASSUMED_SHAPES}{}, and so are clearances of the arm: {}",
+                data.name,
+                reason.trim()
+            ));
+        }
     }
 
     fn check_names(&self, stated: &BTreeMap<String, StatedShape>) -> Result<(), Finding> {

@@ -13,7 +13,7 @@ use needlebench_cell::Robot;
 use needlebench_geometry::{Shape, TriangleMesh};
 use needlebench_input::{Finding, PackagePaths};
 use needlebench_kinematics::{Body, Dynamics, Joints, Pose, UrGeometry, rotation_angle_between};
-use needlebench_robot::{LoadedRobot, MissingInertia};
+use needlebench_robot::{Arm, LoadedRobot, MissingInertia};
 use needlebench_scenario::{Overrides, load_robot};
 
 const ARM: &str = include_str!("foreign_urdf/arm.urdf");
@@ -547,7 +547,7 @@ fn reaches(robot: &Robot) -> Vec<f64> {
 
 #[test]
 fn a_known_arm_without_shapes_is_as_large_as_it_is() {
-    for arm in ["ur3", "ur3e", "ur5e"] {
+    for arm in Arm::shipped_names() {
         let whole = reaches(&shipped(arm, str::to_owned).unwrap());
         // All shapes out; a speck at the flange; links as thin as sticks.
         let stick = "<collision><geometry><cylinder radius=\"0.01\" length=\"0.3\"/></geometry></collision>";
@@ -588,7 +588,7 @@ fn a_known_arm_without_shapes_is_as_large_as_it_is() {
 
 #[test]
 fn shapes_that_fill_their_links_stay_as_they_are() {
-    for arm in ["ur3", "ur3e", "ur5e"] {
+    for arm in Arm::shipped_names() {
         let robot = shipped(arm, str::to_owned).unwrap();
         let told = robot
             .description
