@@ -11,6 +11,7 @@ use crate::scenario::{
     GoalSection, MountKind, MountSection, PhantomSection, Scenario, TableSection,
 };
 use needlebench_input::TomlText;
+use needlebench_kinematics::{Chain, UrGeometry};
 
 /// Middle of the table from mid-chest, along the patient, mm: head and legs lie on it, as in shipped scenarios.
 const TABLE_FROM_CHEST_MM: f64 = -300.0;
@@ -44,15 +45,38 @@ pub(super) fn assume(
     let all_by_points = scenario.goals.iter().all(is_by_points);
     if all_by_points && scenario.iso9283.is_none() && scenario.excitation.is_none() {
         let robot = library.robot(toml, &scenario.robot, base, overrides);
-        let known = robot.ok().and_then(|robot| {
-            let data = robot.description.arm.as_ref().map(|used| &used.arm.data)?;
-            data.cell.as_ref()?.beside_patient_mm
+        let beside = robot.ok().and_then(|robot| {
+            let arm = robot.description.arm.as_ref();
+            let cell = arm.and_then(|used| used.arm.data.cell.as_ref());
+            let of_arm = cell.and_then(|cell| cell.beside_patient_mm);
+            of_arm.or_else(|| beside_by_reach_mm(&robot.robot.chain))
         });
-        if let Some(beside_mm) = known {
+        if let Some(beside_mm) = beside {
             assume_place(scenario, beside_mm, notes);
             assume_tool(toml, scenario, notes);
         }
     }
+}
+
+/// Where an arm without data of its own is put: along the patient, out from the table's edge, over its upper face, mm, in
+/// whole centimetres. The straight line through the UR3's and the UR5e's `beside_patient_mm`, by what upper arm and
+/// forearm reach together. None for a chain that is not a UR arm's.
+fn beside_by_reach_mm(chain: &Chain) -> Option<[f64; 3]> {
+    const UR3: (f64, [f64; 3]) = (456.9, [-280.0, 140.0, 270.0]);
+    const UR5E: (f64, [f64; 3]) = (817.2, [-350.0, 390.0, 120.0]);
+    let geometry = UrGeometry::of_chain(chain).ok()?;
+    let reach_mm = 1e3 * (geometry.a2.abs() + geometry.a3.abs());
+    // Longer arms stand farther out, but not lower or nearer to the feet.
+    let share = ((reach_mm - UR3.0) / (UR5E.0 - UR3.0)).max(0.0);
+    let along = |axis: usize, share: f64| {
+        let mm = (UR5E.1[axis] - UR3.1[axis]).mul_add(share, UR3.1[axis]);
+        (mm / 10.0).round() * 10.0
+    };
+    Some([
+        along(0, share.min(1.0)),
+        along(1, share),
+        along(2, share.min(1.0)),
+    ])
 }
 
 /// The file's name, if the scenario has none.

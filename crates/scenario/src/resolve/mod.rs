@@ -69,11 +69,11 @@ use phantom::{off_the_table, place_phantom};
 pub use robot::load_robot;
 pub use servo::ServoSettings;
 use servo::{note_assumed_drives, servo_settings};
-pub use standing::{FOOT_M, RIGID_M};
 use standing::{
-    KnownDepths, Standing, check_distance, check_floor, check_start, note_crowds,
-    note_idle_criteria,
+    BASE_KEY, KnownDepths, PLACE_HINT, Standing, check_distance, check_floor, check_start,
+    note_crowds, note_idle_criteria,
 };
+pub use standing::{FOOT_M, RIGID_M};
 
 /// A scenario with everything that it names read, checked and placed.
 #[derive(Debug, Clone, PartialEq)]
@@ -301,6 +301,24 @@ impl<'a> Draft<'a> {
             ..
         } = self;
         resolve(toml, scenario, source, base, overrides, library, with_goals)
+            .map_err(|findings| self.of_assumed_place(findings))
+    }
+
+    /// What is wrong with a place of the robot that nobody gave, told as that of an assumed one.
+    fn of_assumed_place(&self, mut findings: Vec<Finding>) -> Vec<Finding> {
+        if self.toml.span_of(BASE_KEY).is_some() {
+            return findings;
+        }
+        for finding in &mut findings {
+            if finding.key.as_deref() == Some(BASE_KEY) {
+                finding.message = format!(
+                    "the robot's place is assumed, since [robot] gives none, and cannot be: {}",
+                    finding.message
+                );
+                finding.hint = Some(PLACE_HINT.replace("FILE", self.toml.file));
+            }
+        }
+        findings
     }
 
     /// Entries of goals that have a target and none, where somebody can choose them; the sections of those whose routes
@@ -466,7 +484,13 @@ pub(crate) fn resolve(
         base: &base_solids,
         known: &KnownDepths::default(),
     };
-    standing.check(&mut notes).map_err(one)?;
+    // Before there are goals, a place may still be chosen.
+    let is_open = !with_goals && toml.span_of(BASE_KEY).is_none();
+    if is_open {
+        standing.check_before_placing(&mut notes).map_err(one)?;
+    } else {
+        standing.check(&mut notes).map_err(one)?;
+    }
     surroundings.extend(obstacles.bodies(&scenario.obstacles));
     fixtures.extend(obstacles.fixtures());
     note_idle_criteria(&scenario, &mut notes);

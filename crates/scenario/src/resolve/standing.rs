@@ -41,7 +41,11 @@ const OVERHANG_M: f64 = 0.05;
 /// A goal this many times farther than the arm could ever be long is a slip, and no question of reach.
 const TIMES_REACH: f64 = 2.0;
 
-const BASE_KEY: &str = "robot.base_position_mm";
+/// The key that places the robot.
+pub(super) const BASE_KEY: &str = "robot.base_position_mm";
+/// How a scenario without a place of the robot gets one.
+pub(super) const PLACE_HINT: &str = "`needlebench suggest FILE` proposes base placements; one of your own is \
+                                     `base_position_mm` and `base_rpy_deg` under [robot]";
 const BASE_HINT: &str = "the position is in the world: z up, floor at 0, in millimetres";
 
 /// What stands in a cell.
@@ -69,6 +73,23 @@ impl Standing<'_> {
         self.check_phantom(notes)?;
         self.check_bore()?;
         self.check_obstacles(notes)
+    }
+
+    /// As [`Standing::check`], for a place of the robot that nobody gave and that is still to be chosen: what is wrong with it
+    /// is noted.
+    pub fn check_before_placing(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
+        match self.check(notes) {
+            Err(finding) if finding.key.as_deref() == Some(BASE_KEY) => {
+                notes.push(format!(
+                    "assumed, since [robot] gives no base placement: one that cannot be, as {}; {PLACE_HINT}",
+                    finding.message
+                ));
+                self.check_phantom(notes)?;
+                self.check_bore()?;
+                self.check_obstacles(notes)
+            }
+            checked => checked,
+        }
     }
 
     /// Where the patient lies alone: what is left of [`Standing::check`] if all else is known to stand.
