@@ -5,6 +5,7 @@ mod arms;
 mod assumed;
 mod calibration;
 mod family;
+mod foreign_chains;
 mod foreign_urdf;
 mod goal_direction;
 mod layouts;
