@@ -121,21 +121,41 @@ pub fn starter(
         place = Some(found);
         (resolved, entry) = entry_at(file, &draft(at), overrides, control)?;
     }
-    let entry = entry.map_err(|(why, _)| SuggestError::refused(why, OTHERS))?;
-    drop(resolved);
-    let text = text(options, at.0, at.1, Some(&entry));
+    let mut entry = entry.map_err(|(why, _)| SuggestError::refused(why, OTHERS))?;
+    let mut text = text(options, at.0, at.1, Some(&entry));
+    // The final posture may be feasible where the start posture is not.
+    if let Err(error) = passes(file, &text, overrides) {
+        if place.is_some() {
+            return Err(error);
+        }
+        let best = Some(entry.direction_deg);
+        let found = place_for(resolved, Err((error.to_string(), best)), overrides, control)?;
+        at = (found.position_mm, found.rpy_deg);
+        place = Some(found);
+        entry = entry_at(file, &draft(at), overrides, control)?
+            .1
+            .map_err(|(why, _)| SuggestError::refused(why, OTHERS))?;
+        text = self::text(options, at.0, at.1, Some(&entry));
+        passes(file, &text, overrides)?;
+    }
+    Ok(Starter { text, entry, place })
+}
+
+/// Whether a scenario's text passes all that `check` asks.
+fn passes(file: &str, text: &str, overrides: &Overrides) -> Result<(), SuggestError> {
     let one = |findings: Vec<Finding>| {
         let first = findings.into_iter().next();
         first.map_or(SuggestError::Interrupted, SuggestError::from)
     };
-    let resolved = resolve_scenario(file, &text, Path::new(""), overrides).map_err(one)?;
+    let resolved = resolve_scenario(file, text, Path::new(""), overrides).map_err(one)?;
     let runnable = Runnable::checked(resolved).map_err(|finding| one(vec![finding]))?;
     let (_, findings) = Preview::of(runnable.scenario())
         .map_err(|error| SuggestError::refused(error.to_string(), OTHERS))?;
-    if !findings.is_empty() {
-        return Err(one(findings));
+    if findings.is_empty() {
+        Ok(())
+    } else {
+        Err(one(findings))
     }
-    Ok(Starter { text, entry, place })
 }
 
 /// What to do where no configuration is feasible.
@@ -269,7 +289,7 @@ description = "A first scenario: {about_small}."
 seed = 1 # seed of all random numbers: the same seed gives the same results
 
 [robot]
-urdf = "{arm}" # ur3, ur3e, ur5e, or the path of a URDF of another UR arm
+urdf = "{arm}" # a UR arm, `needlebench init --list` lists all; or the path of a URDF
 base_position_mm = {position} # of its base_link in the world
 base_rpy_deg = {rpy} # roll, pitch, yaw; {looks}
 

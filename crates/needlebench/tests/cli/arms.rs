@@ -54,3 +54,43 @@ fn schema_of_an_arms_data_knows_every_table() {
         assert!(schema["properties"][table].is_object(), "{table}");
     }
 }
+
+/// Across the room, where the place that is assumed for an arm is in the patient.
+const ACROSS: &str = "[phantom]\nhead_yaw_deg = 90\n[[goals]]\nlesion = \"right_upper_lobe\"\n";
+
+#[test]
+fn suggest_proposes_a_place_where_the_assumed_one_cannot_be() {
+    let bench = Bench::with_scenario(ACROSS);
+    let told = [
+        "the robot's place is assumed, since [robot] gives none, and cannot be: the robot's base overlaps the patient",
+        "`needlebench suggest s.toml`",
+    ];
+    bench.run("check s.toml").exits_with(2).complains(told);
+    let suggest = "suggest s.toml --entries 1 --placements 1 --write placed.toml";
+    let said = bench.run(suggest).exits_with(0).stdout;
+    assert!(
+        said.contains("assumed, since [robot] gives no base placement"),
+        "{said}"
+    );
+    bench.run("check placed.toml").exits_with(0);
+}
+
+#[test]
+fn an_arm_by_its_urdf_alone_has_a_place_beside_the_patient() {
+    let bench = Bench::with_scenario("[[goals]]\nlesion = \"right_upper_lobe\"\n");
+    let urdf = include_str!("../../../../models/ur10e/ur10e.urdf");
+    bench.write("ur10e.urdf", urdf);
+    // One with a longer upper arm, of which nothing is known.
+    bench.write("theirs.urdf", &urdf.replace("-0.6127 0 0", "-0.7127 0 0"));
+    for (file, place) in [
+        ("ur10e", "[-350, 700, 920]"),
+        ("theirs", "[-350, 920, 920]"),
+    ] {
+        let check = format!("check s.toml --robot {file}.urdf");
+        let said = bench.run(check).exits_with(0).stdout.replace("\n    ", " ");
+        assert!(
+            said.contains(&format!("base_position_mm = {place}")),
+            "{said}"
+        );
+    }
+}

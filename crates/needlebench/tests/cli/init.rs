@@ -2,7 +2,9 @@
 
 use crate::support::{Bench, Json, holds, mujoco_is_ready};
 
-const ARMS: [&str; 3] = ["ur3", "ur3e", "ur5e"];
+const ARMS: [&str; 9] = [
+    "ur3", "ur3e", "ur5", "ur5e", "ur10", "ur10e", "ur16e", "ur20", "ur30",
+];
 const TEMPLATES: [&str; 3] = ["table", "hanging", "lateral"];
 
 /// Writes a variant, and asks `check` of it.

@@ -351,11 +351,11 @@ fn what_is_open_near_a_cut_is_not_recommended() {
         let study = bench
             .run("study study.toml --json --quiet --no-page")
             .json();
-        let rows = study["statistics"]["overall"]["configurations"].list();
+        let rows = study["overall"]["configurations"].list();
         let count = |key: &str| -> u64 { rows.iter().map(|row| row[key].as_u64().unwrap()).sum() };
         assert!(count("not_judged") > 0, "{mode}");
         assert!(count("ok") > 0 && count("ok") + count("not_judged") == moved.len() as u64);
-        let details = study["statistics"].to_string();
+        let details = study["overall"].to_string();
         holds(&details, ["scan_ends "]);
     }
 }

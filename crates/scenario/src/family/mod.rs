@@ -11,7 +11,7 @@ pub use key_path::KeyPath;
 pub use moves::{MovedPhantom, PhantomMove, PhantomMoves, SHIFT_KEYS, TURN_KEYS};
 pub use setting::{Change, Setting};
 
-use crate::resolve::{ChosenEntries, ModelLibrary, resolve};
+use crate::resolve::{ChosenEntries, Extent, ModelLibrary, resolve};
 use crate::scenario::{GoalSection, Scenario};
 use crate::{Overrides, ResolvedScenario, load_scenario};
 use edit::{Editable, Edited};
@@ -143,7 +143,7 @@ impl ScenarioFamily {
             return Err(out_of_range.into_iter().map(finding).collect());
         }
         let toml = TomlText::without_text(file);
-        let resolved = |scenario: Scenario, with_goals: bool| {
+        let resolved = |scenario: Scenario, extent: Extent| {
             let source = self.base.source.clone();
             let made = resolve(
                 &toml,
@@ -152,7 +152,7 @@ impl ScenarioFamily {
                 &self.folder,
                 &self.overrides,
                 &self.library,
-                with_goals,
+                extent,
             )?;
             all_seen(&made)?;
             Ok::<_, Vec<Finding>>(made)
@@ -164,18 +164,22 @@ impl ScenarioFamily {
         }
         let none = ChosenEntries::default;
         let Some(chooser) = &self.overrides.choose_entry else {
-            return Ok((resolved(scenario, true)?, none()));
+            return Ok((resolved(scenario, Extent::Whole)?, none()));
         };
         if !scenario.goals.iter().any(GoalSection::is_open) {
-            return Ok((resolved(scenario, true)?, none()));
+            return Ok((resolved(scenario, Extent::Whole)?, none()));
         }
         // Routes are planned for each layout.
         let empty = Scenario {
             goals: Vec::new(),
             ..scenario.clone()
         };
-        let chosen = chooser.choose(&toml, &resolved(empty, false)?, &mut scenario.goals)?;
-        Ok((resolved(scenario, true)?, chosen))
+        let chosen = chooser.choose(
+            &toml,
+            &resolved(empty, Extent::WithoutGoals)?,
+            &mut scenario.goals,
+        )?;
+        Ok((resolved(scenario, Extent::Whole)?, chosen))
     }
 
     /// Whether the scenario has such a key, and the change fits its type, for every goal. A value out of

@@ -228,12 +228,23 @@ pub fn resolve_open_scenario(
     let draft = Draft::read(&toml, base, overrides)?;
     let goals = draft.scenario.goals.clone();
     let resolved = draft
-        .without_goals()
+        .without_goals(Extent::Open)
         .map_err(|found| draft.remarked(found))?;
     Ok(OpenScenario {
         resolved: draft.noted(resolved),
         goals,
     })
+}
+
+/// How much of a scenario is resolved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Extent {
+    /// All of it.
+    Whole,
+    /// All but its goals.
+    WithoutGoals,
+    /// All but its goals; a place of the robot that nobody gave is still to be chosen and may be any.
+    Open,
 }
 
 /// A scenario as it was read, with what it leaves out assumed.
@@ -270,7 +281,7 @@ impl<'a> Draft<'a> {
 
     fn resolve(mut self) -> Result<ResolvedScenario, Vec<Finding>> {
         let resolved = self.assume_entries().and_then(|planned| {
-            let resolved = self.resolved(self.scenario.clone(), true)?;
+            let resolved = self.resolved(self.scenario.clone(), Extent::Whole)?;
             Ok(planned.put_back(resolved))
         });
         match resolved {
@@ -279,18 +290,18 @@ impl<'a> Draft<'a> {
         }
     }
 
-    fn without_goals(&self) -> Result<ResolvedScenario, Vec<Finding>> {
+    fn without_goals(&self, extent: Extent) -> Result<ResolvedScenario, Vec<Finding>> {
         let scenario = Scenario {
             goals: Vec::new(),
             ..self.scenario.clone()
         };
-        self.resolved(scenario, false)
+        self.resolved(scenario, extent)
     }
 
     fn resolved(
         &self,
         scenario: Scenario,
-        with_goals: bool,
+        extent: Extent,
     ) -> Result<ResolvedScenario, Vec<Finding>> {
         let source = source_of(self.toml.file.to_owned(), self.toml.text.as_bytes());
         let Self {
@@ -300,7 +311,7 @@ impl<'a> Draft<'a> {
             library,
             ..
         } = self;
-        resolve(toml, scenario, source, base, overrides, library, with_goals)
+        resolve(toml, scenario, source, base, overrides, library, extent)
             .map_err(|findings| self.of_assumed_place(findings))
     }
 
@@ -330,7 +341,7 @@ impl<'a> Draft<'a> {
         if !self.scenario.goals.iter().any(GoalSection::is_open) {
             return Ok(PlannedSections::default());
         }
-        let cell = self.without_goals()?;
+        let cell = self.without_goals(Extent::WithoutGoals)?;
         let mut chosen = chooser.choose(self.toml, &cell, &mut self.scenario.goals)?;
         self.remarks.append(&mut chosen.remarks);
         Ok(chosen.planned)
@@ -358,7 +369,7 @@ impl<'a> Draft<'a> {
 }
 
 /// Resolves a scenario whose values are in their ranges; `toml` says where they stand, and `library`
-/// keeps what is read. One that needs goals is refused `with_goals` if it has none.
+/// keeps what is read. One that needs goals is refused as a whole if it has none.
 pub(crate) fn resolve(
     toml: &TomlText<'_>,
     scenario: Scenario,
@@ -366,9 +377,10 @@ pub(crate) fn resolve(
     base: &Path,
     overrides: &Overrides,
     library: &ModelLibrary,
-    with_goals: bool,
+    extent: Extent,
 ) -> Result<ResolvedScenario, Vec<Finding>> {
     let one = |finding: Finding| vec![finding];
+    let with_goals = extent == Extent::Whole;
     let mut findings = scenario::check_together(toml, &scenario, with_goals);
     let engines = scenario.engines.run.as_deref();
     findings.extend(check_engine_names(
@@ -484,9 +496,7 @@ pub(crate) fn resolve(
         base: &base_solids,
         known: &KnownDepths::default(),
     };
-    // Before there are goals, a place may still be chosen.
-    let is_open = !with_goals && toml.span_of(BASE_KEY).is_none();
-    if is_open {
+    if extent == Extent::Open && toml.span_of(BASE_KEY).is_none() {
         standing.check_before_placing(&mut notes).map_err(one)?;
     } else {
         standing.check(&mut notes).map_err(one)?;

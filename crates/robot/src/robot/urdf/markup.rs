@@ -60,7 +60,10 @@ pub(super) fn read_markup(file: &str, text: &str) -> Result<Markup, Finding> {
     if let Some(node) = root.descendants().find(is_xacro) {
         return Err(reader
             .finding(node, "this is a xacro file, not a URDF")
-            .hint("expand it first: xacro file.urdf.xacro > file.urdf"));
+            .hint(
+                "expand it first: xacro FILE > robot.urdf; ROS 2's description of UR arms by xacro ur.urdf.xacro \
+                 name:=ur ur_type:=ur10e > robot.urdf",
+            ));
     }
     reader.check(root, &ROBOT)?;
     for node in own_children(root) {
