@@ -103,7 +103,7 @@ fn no_scan(file: &str, scenario: &Scenario) -> Finding {
 
 fn of_flange(file: &str, index: usize, goal: &str) -> Finding {
     let message = format!(
-        "goal `{goal}` is a pose of the flange: its place in the scan depends on where the patient lies"
+        "goal `{goal}` is a pose of the flange: where it is in the scan depends on where the patient lies"
     );
     Finding::new(file, message)
         .key(format!("goals[{index}].flange_pose"))

@@ -243,7 +243,7 @@ pub(crate) enum Extent {
     Whole,
     /// All but its goals.
     WithoutGoals,
-    /// All but its goals; a place of the robot that nobody gave is still to be chosen and may be any.
+    /// All but its goals; a base placement that nobody gave is still to be chosen and may be any.
     Open,
 }
 
@@ -315,7 +315,7 @@ impl<'a> Draft<'a> {
             .map_err(|findings| self.of_assumed_place(findings))
     }
 
-    /// What is wrong with a place of the robot that nobody gave, told as that of an assumed one.
+    /// What is wrong with a base placement that nobody gave, told as that of an assumed one.
     fn of_assumed_place(&self, mut findings: Vec<Finding>) -> Vec<Finding> {
         if self.toml.span_of(BASE_KEY).is_some() {
             return findings;

@@ -43,7 +43,7 @@ const TIMES_REACH: f64 = 2.0;
 
 /// The key that places the robot.
 pub(super) const BASE_KEY: &str = "robot.base_position_mm";
-/// How a scenario without a place of the robot gets one.
+/// How a scenario without a base placement gets one.
 pub(super) const PLACE_HINT: &str = "`needlebench suggest FILE` proposes base placements; one of your own is \
                                      `base_position_mm` and `base_rpy_deg` under [robot]";
 const BASE_HINT: &str = "the position is in the world: z up, floor at 0, in millimetres";
@@ -75,7 +75,7 @@ impl Standing<'_> {
         self.check_obstacles(notes)
     }
 
-    /// As [`Standing::check`], for a place of the robot that nobody gave and that is still to be chosen: what is wrong with it
+    /// As [`Standing::check`], for a base placement that nobody gave and that is still to be chosen: what is wrong with it
     /// is noted.
     pub fn check_before_placing(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
         match self.check(notes) {
