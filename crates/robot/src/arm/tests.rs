@@ -164,7 +164,7 @@ fn an_arm_is_named_in_any_case_or_by_its_file_or_folder() {
     let finding = Arm::of_reference("none/arm.toml", here)
         .unwrap_err()
         .to_string();
-    assert!(finding.contains("one of ur3"), "{finding}");
+    assert!(finding.contains("one of ur10"), "{finding}");
 }
 
 fn read(folder: &Path, urdf: &str) -> Result<LoadedRobot, Finding> {
