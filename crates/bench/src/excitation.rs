@@ -128,7 +128,6 @@ pub(crate) fn run(
             truth: setup.real.report(),
             notes: notes(resolved, &chosen),
             excitation: Some(report),
-            judged: None,
             engine_failures: failures,
             ..empty_report(resolved, identities, timings)
         },

@@ -109,7 +109,6 @@ pub(crate) fn run(
             truth: setup.real.report(),
             notes: notes(resolved, &chosen),
             iso9283: Some(report),
-            judged: None,
             engine_failures: failures,
             ..empty_report(resolved, identities, timings)
         },

@@ -3,7 +3,6 @@
 mod course;
 mod peaks;
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
@@ -12,8 +11,9 @@ use needlebench_clearance::{ClearanceModel, MotionCertificate};
 use needlebench_evaluation::judged::{
     BesideReport, HoldReport, JudgedReport, LARGEST_MARGIN, OwnPlanReport, SAME_CONFIGURATION,
 };
-use needlebench_evaluation::planned_clearance;
-use needlebench_evaluation::report::{CriterionResult, Report, Status, Verdict};
+use needlebench_evaluation::report::{
+    ConfigurationReport, CriterionResult, Report, Status, Verdict,
+};
 use needlebench_input::Finding;
 use needlebench_kinematics::ik::{Configuration, Kinematics};
 use needlebench_kinematics::trajectory::{Between, JointTrajectory, Phase};
@@ -160,18 +160,20 @@ pub fn judge(
 
     let mut reports = Vec::new();
     for (index, (hold, part)) in holds.iter().zip(&parts).enumerate() {
-        let plan = &run.plans[index].configurations[0];
-        let own = Own {
-            planner: &planner,
-            is_asked: asked.beside,
+        let goal = &judged.goals[index];
+        let configuration = &run.report.goals[index].configurations[0];
+        let certificate = run.plans[index].configurations[0].certificate.as_ref();
+        let plans = match certificate.filter(|_| asked.beside) {
+            Some(certificate) => {
+                let certificate = certificate.clone().later_by(part.begins_s);
+                own_plans(&judged, goal, hold, &certificate, &planner)
+            }
+            None => Vec::new(),
         };
-        reports.push(hold_report(
-            &judged,
-            &model,
-            index,
-            (hold, part, plan),
-            &own,
-        ));
+        reports.push(HoldReport {
+            plans,
+            ..hold_report(&judged, goal, hold, part, configuration)
+        });
     }
     let last = parts.last().map_or(0.0, |part| part.ends_s);
     let report = JudgedReport {
@@ -392,36 +394,19 @@ fn parts(resolved: &ResolvedScenario, course: &Course<'_>, holds: &[Hold]) -> Ve
     parts
 }
 
-/// What needlebench plans beside a motion.
-struct Own<'a, 'p> {
-    planner: &'a Planner<'p>,
-    is_asked: bool,
-}
-
+/// What is known of a hold, without plans beside it.
 fn hold_report(
     judged: &ResolvedScenario,
-    model: &ClearanceModel,
-    index: usize,
-    (hold, part, plan): (&Hold, &Part, &ConfigurationPlan),
-    own: &Own<'_, '_>,
+    goal: &Goal,
+    hold: &Hold,
+    part: &Part,
+    configuration: &ConfigurationReport,
 ) -> HoldReport {
-    let goal = &judged.goals[index];
     let held = &hold.held;
     let nearest = held.nearest.as_ref();
-    let tolerance_m = judged.scenario.planning.certificate_tolerance_mm * 1e-3;
-    let afterwards = part.motion.retreat.as_ref().map(|retreat| {
-        let all = planned_clearance(&judged.cell, model, retreat, tolerance_m).into_iter();
-        let proven =
-            all.filter_map(|(class, found)| Some((class.name(), found.certified_lower_bound_m?)));
-        proven.collect::<BTreeMap<_, _>>()
-    });
-    let plans = match &plan.certificate {
-        Some(certificate) if own.is_asked => {
-            let certificate = certificate.clone().later_by(part.begins_s);
-            own_plans(judged, goal, hold, &certificate, own.planner)
-        }
-        _ => Vec::new(),
-    };
+    let afterwards = configuration.retreat_clearance.classes.iter();
+    let afterwards =
+        afterwards.filter_map(|(class, found)| Some((*class, found.certified_lower_bound_m?)));
     HoldReport {
         goal: goal.name.clone(),
         label: nearest.map(|_| hold.configuration.label()),
@@ -434,8 +419,8 @@ fn hold_report(
         angle_off_rad: held.off_rad,
         joint_off_rad: nearest.map(|each| each.off_rad),
         peaks: peaks(judged, &part.whole(), &part.points_s, part.begins_s),
-        afterwards_m: afterwards.unwrap_or_default(),
-        plans,
+        afterwards_m: afterwards.collect(),
+        plans: Vec::new(),
     }
 }
 

@@ -2,16 +2,15 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Args, ValueEnum};
 use needlebench_bench::RunOptions;
 use needlebench_bench::judge::{JudgeError, JudgeOptions, judge as judge_motion};
 use needlebench_kinematics::trajectory::Between;
 use needlebench_recorded::{MotionOptions, read_motion};
-use needlebench_report::{junit, write_atomically};
 
 use super::results_folder::{ResultsFolder, probe_file};
-use super::run::{Outputs, Printed, put};
+use super::run::{Outputs, Printed, put, tell_pipeline};
 use super::{load, overrides, print_json};
 use crate::arguments::{EngineArgument, EngineParser, PicturesArguments, RobotArguments};
 use crate::exit::ExitStatus;
@@ -185,11 +184,7 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
         mcap: false,
         pictures: arguments.pictures.are_wanted(arguments.quiet),
         page: !arguments.no_page,
-        text: match (arguments.json, arguments.wide) {
-            (true, _) => Printed::Nothing,
-            (false, false) => Printed::Screen,
-            (false, true) => Printed::All,
-        },
+        text: Printed::of(arguments.json, arguments.wide),
         quiet: arguments.quiet,
     };
     let (status, report) = put(
@@ -204,10 +199,6 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
     if arguments.json {
         print_json(&report)?;
     }
-    if let Some(path) = &arguments.junit {
-        let junit = junit(&[&report]).map_err(anyhow::Error::from)?;
-        write_atomically(path, junit.as_bytes())
-            .with_context(|| format!("cannot write {}", path.display()))?;
-    }
+    tell_pipeline(&[&report], arguments.junit.as_deref())?;
     Ok(status)
 }

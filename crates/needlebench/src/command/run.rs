@@ -139,11 +139,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
         mcap: arguments.record == Some(Record::Mcap),
         pictures: arguments.pictures.are_wanted(arguments.quiet),
         page: !arguments.no_page,
-        text: match (arguments.json, arguments.wide) {
-            (true, _) => Printed::Nothing,
-            (false, false) => Printed::Screen,
-            (false, true) => Printed::All,
-        },
+        text: Printed::of(arguments.json, arguments.wide),
         quiet: arguments.quiet,
     };
     for (scenario, folder) in scenarios.iter().zip(&folders) {
@@ -190,13 +186,18 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
         }
     }
     let all: Vec<&Report> = reports.iter().collect();
-    if let Some(path) = &arguments.junit {
-        let junit = junit(&all).map_err(anyhow::Error::from)?;
+    tell_pipeline(&all, arguments.junit.as_deref())?;
+    Ok(status)
+}
+
+/// Writes JUnit XML of reports, where it is asked for, and their summaries to the page of a step.
+pub(super) fn tell_pipeline(reports: &[&Report], junit_file: Option<&Path>) -> Result<()> {
+    if let Some(path) = junit_file {
+        let junit = junit(reports).map_err(anyhow::Error::from)?;
         write_atomically(path, junit.as_bytes())
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
-    append_to_step_summary(&all)?;
-    Ok(status)
+    append_to_step_summary(reports)
 }
 
 /// How a scan is computed.
@@ -274,6 +275,17 @@ pub(super) enum Printed {
     Screen,
     /// All tables.
     All,
+}
+
+impl Printed {
+    /// What is printed with `--json` and `--wide`.
+    pub fn of(json: bool, wide: bool) -> Self {
+        match (json, wide) {
+            (true, _) => Self::Nothing,
+            (false, false) => Self::Screen,
+            (false, true) => Self::All,
+        }
+    }
 }
 
 /// Runs one scenario and writes its results into an existing folder.
