@@ -160,7 +160,7 @@ fn judge_absent(report: &mut Report, resolved: &ResolvedScenario, engines: &[&'s
 }
 
 /// Criteria of all that moved are not evaluated.
-fn leave_open(report: &mut Report, keys: &[&str], reason: &str) {
+pub(crate) fn leave_open(report: &mut Report, keys: &[&str], reason: &str) {
     let mut subjects: Vec<(String, Option<String>)> = Vec::new();
     if report.iso9283.is_some() {
         subjects.push((protocol::SUBJECT.to_owned(), None));

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use needlebench_cell::Rule;
 use needlebench_clearance::{ClassCertificate, MotionCertificate};
 use needlebench_kinematics::ik::{Configuration, Solution};
 use needlebench_kinematics::trajectory::JointTrajectory;
@@ -113,6 +114,17 @@ impl Planner<'_> {
             candidate.wrap = nearest.turns;
             candidate
         });
+        if candidate.is_none() {
+            rejections.push(Rejection {
+                rule: Rule::Unreachable,
+                value: held.off_m,
+                limit: 0.0,
+                unit: "m",
+                detail: "at the roll of the held posture the goal's pose has no solution"
+                    .to_owned(),
+                class: None,
+            });
+        }
         rejections.extend(broken);
         let certificate = self.checker.certificate(&motion.trajectory);
         let retreat = motion.retreat.as_ref();

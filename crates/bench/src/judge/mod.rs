@@ -24,7 +24,7 @@ use needlebench_scenario::{Goal, ResolvedScenario};
 use crate::control::Control;
 use crate::plan::Planned;
 use crate::progress::Progress;
-use crate::run::{judge_rest, run_goals};
+use crate::run::{judge_rest, leave_open, run_goals};
 use crate::scenario_run::{RunError, RunOptions, ScenarioRun};
 use crate::setup::SetupError;
 
@@ -130,12 +130,11 @@ pub fn judge(
     for goal in &mut judged.goals {
         goal.expected.clear();
     }
-    let events = judged.scenario.events.as_mut();
-    if events.is_some_and(|events| std::mem::take(&mut events.retreat)) {
-        notes.push(
-            "events.retreat: what follows the hold is certified as planned, and not simulated"
-                .to_owned(),
-        );
+    // What follows the hold is certified as planned.
+    let mut is_deviation_open = false;
+    if let Some(events) = &mut judged.scenario.events {
+        is_deviation_open = events.retreat && events.max_retraction_deviation_mm.is_some();
+        events.retreat = false;
     }
     judged.notes.extend(notes);
 
@@ -188,6 +187,11 @@ pub fn judge(
     };
     add_criteria(&mut run.report, &planner, &report);
     run.report.judged = Some(report);
+    if is_deviation_open {
+        let key = "events.max_retraction_deviation_mm";
+        let reason = "what follows the hold is certified as planned, and not simulated";
+        leave_open(&mut run.report, &[key], reason);
+    }
     judge_rest(&mut run.report, &judged, options, &engines);
     Ok(JudgedRun {
         resolved: judged,
@@ -505,6 +509,29 @@ fn add_criteria(report: &mut Report, planner: &Planner<'_>, motion: &JudgedRepor
                 detail,
                 requirement: None,
             };
+        for (criterion, value, limit, unit) in [
+            (
+                "guide_position",
+                hold.guide_off_m * 1e3,
+                AT_GOAL_M * 1e3,
+                "mm",
+            ),
+            (
+                "guide_angle",
+                hold.angle_off_rad.to_degrees(),
+                AT_GOAL_RAD.to_degrees(),
+                "deg",
+            ),
+        ] {
+            all.push(result(
+                criterion.to_owned(),
+                value,
+                limit,
+                unit,
+                value <= limit,
+                "off its place at the goal; no farther off is it held there".to_owned(),
+            ));
+        }
         for peak in &hold.peaks {
             all.push(result(
                 peak.criterion.to_owned(),

@@ -257,6 +257,11 @@ fn motions_that_begin_or_end_elsewhere_or_jump_are_refused_with_where() {
     let done = judged(&resolved, &from(0, 150), &named).unwrap();
     let hold = &done.run.report.judged.as_ref().unwrap().holds[0];
     assert!(hold.is_added && hold.guide_off_m > 0.02);
+    // Judged all the same, and not passed.
+    assert_eq!(done.run.report.verdict, Verdict::Fail);
+    let off = done.run.report.criteria.iter();
+    let off = off.clone().find(|each| each.criterion == "guide_position");
+    assert!(off.is_some_and(|each| !each.pass && each.value > Some(20.0)));
     let mut jumps = from(0, whole);
     jumps.states[70].position[3] += 0.5;
     let jump = refused(&resolved, &jumps);

@@ -27,7 +27,7 @@ in radians. Points without times get them from the limits of the scenario's [mot
 
 The goal is the one at which the guide stands, within 20 mm and 5 degrees; the configuration the one of the eight whose \
 solution is nearest. Several holds of one motion are judged in their order. Judged are the criteria of a run, and \
-besides: joint_range, joint_speed, joint_acceleration, joint_torque. Certified clearances are those of the course \
+besides: guide_position, guide_angle, joint_range, joint_speed, joint_acceleration, joint_torque. Certified clearances are those of the course \
 between the points.
 
 Results in OUT/NAME of the scenario, as of a run.

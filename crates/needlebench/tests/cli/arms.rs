@@ -81,7 +81,7 @@ fn an_arm_by_its_urdf_alone_has_a_place_beside_the_patient() {
     let urdf = include_str!("../../../../models/ur10e/ur10e.urdf");
     bench.write("ur10e.urdf", urdf);
     // One with a longer upper arm, of which nothing is known.
-    bench.write("theirs.urdf", &urdf.replace("-0.6127 0 0", "-0.7127 0 0"));
+    bench.write("theirs.urdf", urdf.replace("-0.6127 0 0", "-0.7127 0 0"));
     for (file, place) in [
         ("ur10e", "[-350, 700, 920]"),
         ("theirs", "[-350, 920, 920]"),
