@@ -10,7 +10,7 @@ use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
     ClassClearance, ClassMarginReport, ClearanceReport, ConfigurationReport, EngineFailure,
     EngineReport, ExpectedReport, GoalReport, MarginReport, MarginsReport, PhaseReport,
-    RejectionReport, Report, RouteReport, SCHEMA_VERSION, ScenarioSummary, SearchReport, Status,
+    RejectionReport, Report, RouteReport, SCHEMA_VERSION, ScenarioSummary, SearchReport,
     StraightReport,
 };
 use needlebench_evaluation::room::RoomModel;
@@ -34,7 +34,6 @@ use crate::events::{EventRun, events_report};
 use crate::provenance::provenance;
 use crate::setup::Setup;
 use crate::simulate::EngineRun;
-use crate::study::set_clearances;
 
 /// What the stages of a run made.
 pub(crate) struct Results<'a> {
@@ -302,17 +301,12 @@ fn configuration_report(
     let mut clearance = overall_clearance(setup, plan, &engines);
     let mut posture = ConfigurationReport::new(plan.configuration.label());
     if let Some(candidate) = candidate {
-        set_clearances(&mut posture, &candidate.clearance);
+        posture.set_posture_clearances(&candidate.clearance);
     }
-    let ConfigurationReport {
-        mut posture_clearance_m,
-        posture_behind_cuts_m,
-        ..
-    } = posture;
     if let Some(route) = route {
         let class = ClearanceClass::NeedleRoute.name();
         clearance.classes.insert(class, route.clone());
-        posture_clearance_m.insert(class, route.minimum_m);
+        posture.posture_clearance_m.insert(class, route.minimum_m);
     }
     let commanded = candidate.map(|each| {
         let kinematics = setup.planner.kinematics();
@@ -323,9 +317,6 @@ fn configuration_report(
     let recordings: Vec<&Recording> = runs.iter().map(|run| &run.recording).collect();
     let engine_difference = engine_difference(real.cell(), real.goal(goal_index), &recordings);
     ConfigurationReport {
-        label: plan.configuration.label(),
-        status: Status::Rejected, // `judge` sets it
-        not_judged: 0,            // this too
         rejections: plan.rejections.iter().map(rejection_report).collect(),
         joints_rad: candidate.map(|each| each.joints.into()),
         roll_rad: candidate.map(|each| each.roll_rad),
@@ -353,8 +344,6 @@ fn configuration_report(
         adjudication: judged.adjudication.clone(),
         referee: judged.referee.clone(),
         clearance,
-        posture_clearance_m,
-        posture_behind_cuts_m,
         surplus_m: surplus_m(&setup.planner, plan),
         predicted: if real.is_imperfect() {
             predicted.map(|each| each.needle)
@@ -362,9 +351,6 @@ fn configuration_report(
             commanded
         },
         tip_sensitivity_m_per_rad: candidate.map(|each| tip_sensitivity(cell, goal, &each.joints)),
-        pareto: false,
-        dominated_by: None,
-        ranking: None,
         events: events
             .iter()
             .find(|run| run.goal == goal_index && run.configuration == plan.configuration.index())
@@ -373,11 +359,8 @@ fn configuration_report(
             .as_ref()
             .zip(candidate)
             .map(|(room, each)| room.measure(goal_index, &each.joints)),
-        budget: None,
-        budget_failure: None,
-        measured: BTreeMap::new(), // when the budget is there
-        metrics: BTreeMap::new(),  // measured when the budget is there
-        files: Vec::new(),
+        // `judge` sets the status; the budget and what is measured with it follow.
+        ..posture
     }
 }
 

@@ -17,7 +17,6 @@ use needlebench_scenario::{Goal, ResolvedScenario};
 use serde::Serialize;
 
 use crate::assemble::{rejection_report, route_report};
-use crate::study::set_clearances;
 
 /// What all of it rests on, for people.
 pub const BASIS: &str = "postures only, motions not planned";
@@ -203,7 +202,7 @@ fn configuration_preview(
 ) -> ConfigurationPreview {
     let fault = member.candidate.as_ref().and_then(|candidate| {
         let mut posture = ConfigurationReport::new(configuration.label());
-        set_clearances(&mut posture, &candidate.clearance);
+        posture.set_posture_clearances(&candidate.clearance);
         judge_posture(&posture, &resolved.scenario.criteria)
     });
     let fault = fault.filter(|_| member.works());

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use needlebench_clearance::is_known;
+use needlebench_clearance::{ClassMinima, is_known};
 use needlebench_engine::EngineIdentity;
 use needlebench_robot::{ArmReport, LinkEnclosure};
 use needlebench_scenario::GravitySettings;
@@ -429,6 +429,19 @@ impl ConfigurationReport {
             measured: BTreeMap::new(),
             metrics: BTreeMap::new(),
             files: Vec::new(),
+        }
+    }
+
+    /// Sets the clearances of its posture: the least one of each class, and what may be nearer behind the cuts of the
+    /// patient's scan.
+    pub fn set_posture_clearances(&mut self, minima: &ClassMinima) {
+        for pair in minima.iter() {
+            let class = pair.class.name();
+            let distance_m = pair.separation.distance_m;
+            self.posture_clearance_m.insert(class, distance_m);
+            if let Some(behind_cuts_m) = minima.behind_cuts_m(pair.class) {
+                self.posture_behind_cuts_m.insert(class, behind_cuts_m);
+            }
         }
     }
 

@@ -17,7 +17,6 @@ use serde::Serialize;
 use super::{Rounded, RouteTask};
 use crate::Control;
 use crate::real_cell::servo_of;
-use crate::study::set_clearances;
 use crate::suggest::SuggestError;
 
 /// Directions about the needle that are looked at for each configuration.
@@ -213,7 +212,7 @@ fn with_robot<T>(
 /// The first criterion on clearances that a posture misses, or why one is not evaluated.
 fn fault(resolved: &ResolvedScenario, candidate: &Candidate) -> Option<String> {
     let mut posture = ConfigurationReport::new("");
-    set_clearances(&mut posture, &candidate.clearance);
+    posture.set_posture_clearances(&candidate.clearance);
     let fault = judge_posture(&posture, &resolved.scenario.criteria)?;
     Some(fault.into_detail().into_owned())
 }

@@ -35,5 +35,4 @@ pub use prepare::{PreparedStudy, in_words, time_per_case};
 pub use replan::{ReplanControl, ReplanDraw, Replanned, replan_draw, replanned};
 pub use robust::{RobustnessResult, robustness_of};
 pub use rows::{CaseRow, StudyColumns, metric_column};
-pub(crate) use static_case::set_clearances;
 pub use static_case::{NO_ENTRY, StaticWorker, rows_without_scenario, static_rows};

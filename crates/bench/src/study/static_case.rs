@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use needlebench_cell::ClearanceClass;
-use needlebench_clearance::{ClassMinima, ClearanceModel};
+use needlebench_clearance::ClearanceModel;
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_evaluation::{PostureFault, judge_posture};
 use needlebench_input::{Finding, nothing_serves};
@@ -166,7 +166,7 @@ impl StaticWorker {
             let (clearance, rejections) = planner.clearance_rules(q);
             broken_rule(&rejections).or_else(|| {
                 let mut posture = ConfigurationReport::new("");
-                set_clearances(&mut posture, &clearance);
+                posture.set_posture_clearances(&clearance);
                 judge_posture(&posture, &resolved.scenario.criteria).map(PostureFault::into_detail)
             })
         })
@@ -255,7 +255,7 @@ fn row(
     };
     posture.joints_rad = Some(candidate.joints.into());
     posture.margins = Some(margins_report(&candidate.margins));
-    set_clearances(posture, &candidate.clearance);
+    posture.set_posture_clearances(&candidate.clearance);
     let goal = &resolved.goals[0];
     posture.tip_sensitivity_m_per_rad = Some(planner.tip_sensitivity(goal, candidate));
     posture.entry_to_target_m = goal.entry_to_target_m();
@@ -275,17 +275,4 @@ fn row(
     let margin_m = margin_m(planner, resolved, member, &row.measured, counted, is_ok);
     row.margin_m = Some(margin_m);
     row
-}
-
-/// The least clearance of each class, and what may be nearer behind the cuts of the patient's scan.
-pub(crate) fn set_clearances(posture: &mut ConfigurationReport, minima: &ClassMinima) {
-    let behind = minima.iter().filter_map(|pair| {
-        let behind_cuts_m = minima.behind_cuts_m(pair.class)?;
-        Some((pair.class.name(), behind_cuts_m))
-    });
-    posture.posture_behind_cuts_m.extend(behind);
-    let found = minima.iter();
-    posture
-        .posture_clearance_m
-        .extend(found.map(|pair| (pair.class.name(), pair.separation.distance_m)));
 }
