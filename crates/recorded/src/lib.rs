@@ -6,6 +6,7 @@
 //! not determine it, and the error on held-out rows.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
+mod answers_file;
 mod arm_fit;
 mod calibration;
 mod check;
@@ -26,6 +27,7 @@ use std::path::Path;
 
 use needlebench_input::Finding;
 
+pub use answers_file::{Answer, AnswersFile, AnswersSource, Asked, Question, read_answers};
 pub use arm_fit::{ArmFit, arm_fits};
 pub use calibration::{CalibratedLink, CalibrationFit, PoseError, calibrate};
 pub use identify::{

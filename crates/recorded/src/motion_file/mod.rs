@@ -4,6 +4,8 @@ mod message;
 mod of_log;
 mod table;
 
+pub(crate) use table::{lines as content_lines, position_of_joint};
+
 use std::path::Path;
 
 use needlebench_input::{Finding, read_data_text, sha256_hex};

@@ -11,7 +11,7 @@ pub(super) fn header(text: &str) -> Option<(usize, &str)> {
 }
 
 /// Lines with content, with their places in bytes.
-fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let mut place = 0;
     let all = text.split_inclusive('\n').map(move |line| {
         let begins = place;
@@ -90,6 +90,14 @@ fn column(name: &str) -> Result<Column, &'static str> {
     let rest = unitless.unwrap_or(rest);
     let derivative = QUANTITIES.iter().position(|names| names.contains(&rest));
     Ok(derivative.map_or(Column::Other, |derivative| Column::Joint(derivative, joint)))
+}
+
+/// The joint whose position a column holds by its name; the error is a unit that is refused.
+pub(crate) fn position_of_joint(name: &str) -> Result<Option<usize>, &'static str> {
+    Ok(match column(name)? {
+        Column::Joint(0, joint) => Some(joint),
+        _ => None,
+    })
 }
 
 pub(super) fn read(file: &str, text: &str) -> Result<Points, Vec<Finding>> {

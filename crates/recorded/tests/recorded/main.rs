@@ -1,5 +1,6 @@
 //! Tests of the crate from outside.
 
+mod answers_files;
 mod bad_logs;
 mod closed_loop;
 mod common;
