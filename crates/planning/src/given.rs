@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use needlebench_cell::Rule;
-use needlebench_clearance::{ClassCertificate, MotionCertificate};
+use needlebench_clearance::{ClassCertificate, ClassMinima, MotionCertificate};
 use needlebench_kinematics::ik::{Configuration, Solution};
 use needlebench_kinematics::trajectory::JointTrajectory;
-use needlebench_kinematics::{JOINT_COUNT, Joints, rotation_angle_between};
+use needlebench_kinematics::{JOINT_COUNT, Joints, Pose, rotation_angle_between};
 use needlebench_scenario::{Goal, Roll};
 
 use crate::motion_plan::ConfigurationPlan;
@@ -69,8 +69,21 @@ impl Planner<'_> {
         };
         let planned = goal.world_from_guide_exit_at(roll_rad);
         let pose = self.base_link_from_flange(goal, roll_rad);
-        let found = self.kinematics().branches(&pose, Some(joints));
-        let nearest = found.solutions.into_iter().map(|solution| {
+        Held {
+            joints: *joints,
+            roll_rad,
+            off_m: (exit.translation.vector - planned.translation.vector).norm(),
+            off_rad: rotation_angle_between(&exit.rotation, &planned.rotation),
+            nearest: self.nearest(&pose, joints),
+        }
+    }
+
+    /// The solution of a pose of the flange in `base_link` that is nearest to a posture; none of a pose without any.
+    pub fn nearest(&self, base_link_from_flange: &Pose, joints: &Joints) -> Option<Nearest> {
+        let found = self
+            .kinematics()
+            .branches(base_link_from_flange, Some(joints));
+        let all = found.solutions.into_iter().map(|solution| {
             let off = (joints - solution.joints) / TAU;
             let turns: [i32; JOINT_COUNT] = std::array::from_fn(|joint| whole(off[joint]));
             let left = Joints::from_fn(|joint, _| (off[joint] - f64::from(turns[joint])) * TAU);
@@ -80,13 +93,15 @@ impl Planner<'_> {
                 solution,
             }
         });
-        Held {
-            joints: *joints,
-            roll_rad,
-            off_m: (exit.translation.vector - planned.translation.vector).norm(),
-            off_rad: rotation_angle_between(&exit.rotation, &planned.rotation),
-            nearest: nearest.min_by(|a, b| a.off_rad.total_cmp(&b.off_rad)),
-        }
+        all.min_by(|a, b| a.off_rad.total_cmp(&b.off_rad))
+    }
+
+    /// Clearances of a solution's posture, and all rules that it violates.
+    pub fn posture_rules(&self, solution: &Solution) -> (ClassMinima, Vec<Rejection>) {
+        let mut rejections = self.joint_rules(solution);
+        let (clearance, broken) = self.clearance_rules(&solution.joints);
+        rejections.extend(broken);
+        (clearance, rejections)
     }
 
     /// The plan that a given motion is: its certified clearances, and the rules that its posture and its course violate.

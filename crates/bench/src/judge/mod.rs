@@ -1,6 +1,8 @@
 //! Motions that somebody else planned, judged as a run judges its own.
 
+pub mod answers;
 mod course;
+pub mod free;
 mod peaks;
 
 use std::ops::Range;
@@ -29,7 +31,7 @@ use crate::scenario_run::{RunError, RunOptions, ScenarioRun};
 use crate::setup::SetupError;
 
 use course::Course;
-use peaks::{is_kept, peaks};
+use peaks::{peaks, results};
 
 /// How a motion is judged.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -110,7 +112,7 @@ pub fn judge(
         );
         return Err(finding
             .key("goals")
-            .hint("choose a scenario with [[goals]]")
+            .hint("choose a scenario with [[goals]], or judge the clearances alone with --free")
             .into());
     }
     let course = Course::of(resolved, file, asked.between)?;
@@ -287,7 +289,8 @@ fn holds(
             course.times_s[best.points.end]
         );
         let hint = format!(
-            "a guide is at a goal within {:.0} mm and {:.0} deg; judge it by one all the same with --goal NAME",
+            "a guide is at a goal within {:.0} mm and {:.0} deg; judge it by one all the same with --goal NAME, or its clearances \
+             alone with --free",
             AT_GOAL_M * 1e3,
             AT_GOAL_RAD.to_degrees()
         );
@@ -532,19 +535,7 @@ fn add_criteria(report: &mut Report, planner: &Planner<'_>, motion: &JudgedRepor
                 "off its place at the goal; no farther off is it held there".to_owned(),
             ));
         }
-        for peak in &hold.peaks {
-            all.push(result(
-                peak.criterion.to_owned(),
-                peak.value,
-                peak.limit,
-                peak.unit,
-                is_kept(peak),
-                format!(
-                    "{} at t = {:.3} s; limit: {}",
-                    peak.joint, peak.time_s, peak.of
-                ),
-            ));
-        }
+        all.extend(results(&hold.peaks, &hold.goal, Some(configuration.label)));
         // Of what a scan's unseen body may undercut nothing is said but that it fails.
         let open: Vec<&str> = configuration.retreat_clearance.unknown().collect();
         for (class, lower_bound_m) in &hold.afterwards_m {

@@ -1,6 +1,7 @@
 //! Largest joint values, speeds, accelerations and torques of a motion, beside their limits.
 
 use needlebench_evaluation::judged::PeakReport;
+use needlebench_evaluation::report::CriterionResult;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 use needlebench_scenario::ResolvedScenario;
@@ -128,8 +129,32 @@ pub(crate) fn peaks(
     found
 }
 
+/// A criterion for each peak.
+pub(super) fn results(
+    peaks: &[PeakReport],
+    goal: &str,
+    label: Option<&str>,
+) -> Vec<CriterionResult> {
+    let all = peaks.iter().map(|peak| CriterionResult {
+        goal: goal.to_owned(),
+        label: label.map(str::to_owned),
+        engine: None,
+        criterion: peak.criterion.to_owned(),
+        value: Some(peak.value),
+        limit: Some(peak.limit),
+        unit: peak.unit,
+        pass: is_kept(peak),
+        detail: format!(
+            "{} at t = {:.3} s; limit: {}",
+            peak.joint, peak.time_s, peak.of
+        ),
+        requirement: None,
+    });
+    all.collect()
+}
+
 /// Whether a peak is within its limit.
-pub(crate) fn is_kept(peak: &PeakReport) -> bool {
+fn is_kept(peak: &PeakReport) -> bool {
     let slack = ROUNDING * peak.limit.abs();
     match peak.criterion {
         // Beyond the limit on its own side.
