@@ -1,5 +1,6 @@
 //! Runs and cases of studies, from outside the crate.
 
+mod answers;
 mod directed;
 mod further_engine;
 mod judge;

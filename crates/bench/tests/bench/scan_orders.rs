@@ -182,7 +182,13 @@ fn sagittal_and_coronal_stacks_give_the_patient_of_axial_ones() {
                 .map(|each| each.message.clone())
                 .collect::<Vec<_>>()
         };
-        assert_eq!(said(&build), said(&wanted), "{order:?}");
+        // That its slices are not axial is all that is said of it besides.
+        let mut heard = said(&build);
+        let before = heard.len();
+        heard.retain(|each| !each.starts_with("the slices are not axial"));
+        let is_axial = order[2].0 == 2;
+        assert_eq!(before - heard.len(), usize::from(!is_axial), "{order:?}");
+        assert_eq!(heard, said(&wanted), "{order:?}");
         // Places differ by rounding alone.
         let [a, b] = [&build, &wanted].map(|build| {
             let size = size(build);
