@@ -16,7 +16,10 @@ mod replay;
 pub mod table;
 
 pub use files::write_atomically;
-pub use junit::{JudgedLimit, comparison_junit, junit, limits_junit, study_comparison_junit};
+pub use junit::{
+    JudgedLimit, answers_junit, comparison_junit, free_junit, junit, limits_junit,
+    study_comparison_junit,
+};
 pub use markdown::{
     MetricDescription, comparison_markdown, markdown, metric_descriptions, metrics_markdown,
     schema_markdown, study_comparison_markdown,

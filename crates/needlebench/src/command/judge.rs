@@ -2,16 +2,25 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use needlebench_bench::RunOptions;
+use needlebench_bench::judge::answers::{AnswersOptions, TOLERANCE, judge_answers};
+use needlebench_bench::judge::free::judge_free;
 use needlebench_bench::judge::{JudgeError, JudgeOptions, judge as judge_motion};
+use needlebench_bench::progress::Silent;
+use needlebench_bench::{Control, RunOptions};
+use needlebench_evaluation::report::Verdict;
 use needlebench_kinematics::trajectory::Between;
-use needlebench_recorded::{MotionOptions, read_motion};
+use needlebench_recorded::{MotionOptions, read_answers, read_motion};
+use needlebench_report::table::answers::answers_text;
+use needlebench_report::table::free::free_text;
+use needlebench_report::{answers_junit, free_junit, write_atomically};
+use needlebench_scenario::ResolvedScenario;
+use serde::Serialize;
 
 use super::results_folder::{ResultsFolder, probe_file};
 use super::run::{Outputs, Printed, put, tell_pipeline};
-use super::{load, overrides, print_json};
+use super::{load, overrides, print_json, print_text};
 use crate::arguments::{EngineArgument, EngineParser, PicturesArguments, RobotArguments};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
@@ -27,13 +36,17 @@ in radians. Points without times get them from the limits of the scenario's [mot
 
 The goal is the one at which the guide stands, within 20 mm and 5 degrees; the configuration the one of the eight whose \
 solution is nearest. Several holds of one motion are judged in their order. Judged are the criteria of a run, and \
-besides: guide_position, guide_angle, joint_range, joint_speed, joint_acceleration, joint_torque. Certified clearances are those of the course \
-between the points.
+besides: guide_position, guide_angle, joint_range, joint_speed, joint_acceleration, joint_torque. Certified clearances \
+are those of the course between the points.
 
-Results in OUT/NAME of the scenario, as of a run.
+With --answers the joint positions that a solver of inverse kinematics gave are judged against the complete set of \
+solutions: how far each is off, which of the eight it is, what is missing, double or outside the joints' limits.
+
+Results of a motion to a goal in OUT/NAME of the scenario, as of a run.
 
 Example: needlebench judge scenarios/table3.toml --motion plan.json
-Example: needlebench judge cell.toml --motion moveit.yaml --goal lesion --start as-is --engine rapier";
+Example: needlebench judge cell.toml --motion moveit.yaml --goal lesion --start as-is --engine rapier
+Example: needlebench judge cell.toml --answers solver.csv --junit solver.xml";
 
 #[derive(Debug, Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
@@ -42,36 +55,66 @@ pub(crate) struct JudgeArguments {
     #[arg(value_name = "SCENARIO")]
     pub scenario: PathBuf,
     /// Motion to judge.
-    #[arg(long, value_name = "FILE")]
-    pub motion: PathBuf,
-    /// Goal that the motion leads to [default: those at which it stands].
+    #[arg(long, value_name = "FILE", required_unless_present = "answers")]
+    pub motion: Option<PathBuf>,
+    /// Answers of a solver of inverse kinematics to judge instead: CSV, JSON, Parquet or .npy.
+    #[arg(long, value_name = "FILE", conflicts_with = "motion")]
+    pub answers: Option<PathBuf>,
+    /// Largest distance (m) and angle (rad) of a right answer [default: 1e-4].
+    #[arg(long, value_name = "M_AND_RAD", requires = "answers", value_parser = tolerance)]
+    pub tolerance: Option<f64>,
+    /// One right answer is enough: missing ones are listed, and do not fail.
+    #[arg(long, requires = "answers")]
+    pub partial: bool,
+    /// Judge clearances and joints alone, wherever the motion leads; nothing is simulated.
+    #[arg(long, conflicts_with_all = ["goal", "answers", "engine", "referee", "no_page"])]
+    pub free: bool,
+    /// Goal that the motion leads to [default: those at which it stands], or that is answered.
     #[arg(long, value_name = "NAME")]
     pub goal: Option<String>,
     /// What joins the points [default: quintics with accelerations, cubics with velocities, else straight lines].
-    #[arg(long, value_enum, value_name = "CURVE")]
+    #[arg(long, value_enum, value_name = "CURVE", conflicts_with = "answers")]
     pub between: Option<BetweenArgument>,
     /// Where the motion may begin.
-    #[arg(long, value_enum, value_name = "WHERE", default_value = "scenario")]
+    #[arg(
+        long,
+        value_enum,
+        value_name = "WHERE",
+        default_value = "scenario",
+        conflicts_with = "answers"
+    )]
     pub start: StartArgument,
     /// What the motion is compared with.
-    #[arg(long, value_enum, value_name = "WHAT", default_value = "plan")]
+    #[arg(
+        long,
+        value_enum,
+        value_name = "WHAT",
+        default_value = "plan",
+        conflicts_with = "answers"
+    )]
     pub against: AgainstArgument,
     /// Which positions of a log are judged.
-    #[arg(long, value_enum, value_name = "WHICH", default_value = "target")]
+    #[arg(
+        long,
+        value_enum,
+        value_name = "WHICH",
+        default_value = "target",
+        conflicts_with = "answers"
+    )]
     pub of: OfArgument,
     /// Stretch of a log with gaps, from 1.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "answers")]
     pub stretch: Option<u32>,
     /// Topic of the joint states in an MCAP file.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", conflicts_with = "answers")]
     pub topic: Option<String>,
     /// Physics engines [default: those of the scenario].
-    #[arg(long, value_name = "ENGINE[,ENGINE]", value_parser = EngineParser)]
+    #[arg(long, value_name = "ENGINE[,ENGINE]", value_parser = EngineParser, conflicts_with = "answers")]
     pub engine: Option<EngineArgument>,
     /// Verify every motion against the reference integrator at steps h, h/2 and h/4 (3 to 10 times slower).
-    #[arg(long = "reference")]
+    #[arg(long = "reference", conflicts_with = "answers")]
     pub referee: bool,
-    /// Folder for results; the scenario has a subfolder of its name.
+    /// Folder for results; the scenario has a subfolder of its name. None are written with --answers or --free.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
     /// Print the report as one JSON document instead of the table.
@@ -142,14 +185,33 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
         print_wide();
     }
     let resolved = load(&arguments.scenario, &overrides(&arguments.robot)?)?;
+    let Some(motion) = &arguments.motion else {
+        return answers(arguments, &resolved);
+    };
     let motion = read_motion(
-        &arguments.motion,
+        motion,
         &MotionOptions {
             of_actual: arguments.of == OfArgument::Actual,
             stretch: arguments.stretch.map(|number| number as usize),
             topic: arguments.topic.clone(),
         },
     )?;
+    let between = arguments.between.map(|between| match between {
+        BetweenArgument::Quintics => Between::Quintics,
+        BetweenArgument::Cubics => Between::Cubics,
+        BetweenArgument::Lines => Between::Lines,
+    });
+    if arguments.free {
+        let report = judge_free(&resolved, &motion, between).map_err(failure)?;
+        let junit = free_junit(&report);
+        return told(
+            arguments,
+            &report,
+            &free_text(&report),
+            report.verdict,
+            junit,
+        );
+    }
     let folder = arguments.out.join(&resolved.scenario.name);
     let _taken = ResultsFolder::take(&folder)?;
     if let Some(path) = &arguments.junit {
@@ -164,21 +226,14 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
     };
     let asked = JudgeOptions {
         goal: arguments.goal.clone(),
-        between: arguments.between.map(|between| match between {
-            BetweenArgument::Quintics => Between::Quintics,
-            BetweenArgument::Cubics => Between::Cubics,
-            BetweenArgument::Lines => Between::Lines,
-        }),
+        between,
         any_start: arguments.start == StartArgument::AsIs,
         beside: arguments.against == AgainstArgument::Plan,
     };
     let progress = TerminalProgress::new(arguments.quiet);
     let done = judge_motion(&resolved, &motion, &asked, &options, &cancel, &progress);
     progress.finish();
-    let done = done.map_err(|error| match error {
-        JudgeError::Refused(finding) => Failure::from(*finding),
-        JudgeError::Run(error) => anyhow::Error::from(error).into(),
-    })?;
+    let done = done.map_err(failure)?;
     let outputs = Outputs {
         rtde: false,
         mcap: false,
@@ -201,4 +256,64 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
     }
     tell_pipeline(&[&report], arguments.junit.as_deref())?;
     Ok(status)
+}
+
+/// Judges the answers of a solver.
+fn answers(arguments: &JudgeArguments, resolved: &ResolvedScenario) -> Result<ExitStatus, Failure> {
+    let path = arguments.answers.as_ref();
+    let file = read_answers(path.expect("clap asks for a motion or answers"))?;
+    let cancel = watch_interrupts()?;
+    let control = Control {
+        threads: threads(arguments.jobs),
+        cancel: &cancel,
+        progress: &Silent,
+    };
+    let options = AnswersOptions {
+        goal: arguments.goal.clone(),
+        tolerance: arguments.tolerance.unwrap_or(TOLERANCE),
+        is_partial: arguments.partial,
+    };
+    let report = judge_answers(resolved, &file, &options, &control).map_err(failure)?;
+    let text = answers_text(&report, arguments.wide);
+    let junit = answers_junit(&report);
+    told(arguments, &report, &text, report.verdict, junit)
+}
+
+/// Prints a report, as JSON or as text, and writes its JUnit document.
+fn told(
+    arguments: &JudgeArguments,
+    report: &impl Serialize,
+    text: &str,
+    verdict: Verdict,
+    junit: Result<String, impl std::error::Error + Send + Sync + 'static>,
+) -> Result<ExitStatus, Failure> {
+    if let Some(path) = &arguments.junit {
+        let junit = junit.map_err(anyhow::Error::from)?;
+        write_atomically(path, junit.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    if arguments.json {
+        print_json(report)?;
+    } else {
+        print_text(text.trim_end())?;
+    }
+    Ok(ExitStatus::of(verdict))
+}
+
+fn failure(error: JudgeError) -> Failure {
+    match error {
+        JudgeError::Refused(finding) => Failure::from(*finding),
+        JudgeError::Run(error) => anyhow::Error::from(error).into(),
+    }
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    let value: f64 = text
+        .parse()
+        .map_err(|_| "a number in m and rad".to_owned())?;
+    if value > 0.0 && value <= 1.0 {
+        Ok(value)
+    } else {
+        Err("above 0 and at most 1, in m and rad".to_owned())
+    }
 }

@@ -127,3 +127,95 @@ fn what_is_no_motion_of_this_scenario_is_refused() {
         answer.complains([said]);
     }
 }
+
+/// The answers of `ik`, and what a team's solver would have left out of them.
+#[test]
+fn answers_are_judged_against_the_complete_set() {
+    let bench = bench();
+    let known: Value = bench
+        .run("ik table3.toml --goal pose --json")
+        .exits_with(0)
+        .json();
+    let solutions: Vec<Value> = known["solutions"]
+        .list()
+        .iter()
+        .map(|each| each["joints_rad"].clone())
+        .collect();
+    let write = |name: &str, solutions: &[Value]| {
+        let question = serde_json::json!([{ "goal": "pose", "solutions": solutions }]);
+        bench.write(name, question.to_string());
+    };
+    write("all.json", &solutions);
+    write("some.json", &solutions[..6]);
+    let answer = bench
+        .run("judge table3.toml --answers all.json")
+        .exits_with(0);
+    assert!(
+        answer
+            .stdout
+            .starts_with("PASS table3: 8 of 8 answers right, 8 of 8 solutions answered"),
+        "{}",
+        answer.stdout
+    );
+    let answer = bench
+        .run("judge table3.toml --answers some.json --junit junit.xml --json")
+        .exits_with(1);
+    let report: Value = answer.json();
+    assert_eq!(report["verdict"], "fail");
+    let junit = bench.text("junit.xml");
+    assert!(
+        junit.contains("tests=\"8\" skipped=\"0\" failures=\"2\""),
+        "{junit}"
+    );
+    bench
+        .run("judge table3.toml --answers some.json --partial --junit junit.xml")
+        .exits_with(0);
+    assert!(
+        bench
+            .text("junit.xml")
+            .contains("skipped=\"2\" failures=\"0\"")
+    );
+    assert!(!bench.path("out").exists());
+    for (arguments, said) in [
+        ("--answers nothing.csv", "cannot read the answers"),
+        (
+            "--answers all.json --goal other",
+            "the scenario has no goal `other`",
+        ),
+        ("--answers all.json --engine rapier", "cannot be used with"),
+        ("--answers all.json --tolerance 0", "above 0 and at most 1"),
+        ("--motion straight_line.yaml --partial", "--answers"),
+        ("", "--motion <FILE>"),
+    ] {
+        let answer = bench
+            .run(format!("judge table3.toml {arguments}"))
+            .exits_with(2);
+        answer.complains([said]);
+    }
+}
+
+#[test]
+fn a_motion_to_no_goal_is_judged_by_its_clearances() {
+    let bench = bench();
+    let half = bench.text("straight_line.yaml");
+    // Its last point left out, it ends in the air.
+    let end = half.rfind("\n- positions").unwrap();
+    bench.write("half.yaml", &half[..=end]);
+    let quiet = "--engine rapier --no-pictures --no-page --quiet";
+    bench
+        .run(format!("judge table3.toml --motion half.yaml {quiet}"))
+        .exits_with(2)
+        .complains(["stands at no goal", "--free"]);
+    let answer = bench.run("judge table3.toml --motion half.yaml --free --junit junit.xml --json");
+    let report: Value = answer.exits_with(1).json();
+    let failed = report["criteria"].list().iter();
+    let failed: Vec<&Value> = failed.filter(|each| each["pass"] == false).collect();
+    assert_eq!(failed.len(), 1, "{failed:?}");
+    assert_eq!(failed[0]["criterion"], "joint_acceleration");
+    assert!(
+        bench
+            .text("junit.xml")
+            .contains("min_clearance_mm.robot_phantom")
+    );
+    assert!(!bench.path("out").exists());
+}

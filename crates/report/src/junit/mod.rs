@@ -1,7 +1,9 @@
 //! JUnit XML, for continuous integration.
 
+mod answers;
 mod comparison;
 mod failure;
+mod free;
 mod limits;
 mod replay;
 mod run;
@@ -9,7 +11,9 @@ mod study;
 mod study_comparison;
 mod times;
 
+pub use answers::answers_junit;
 pub use comparison::comparison_junit;
+pub use free::free_junit;
 pub use limits::{JudgedLimit, limits_junit};
 pub(crate) use replay::replay_junit;
 pub use run::junit;

@@ -143,7 +143,8 @@ fn table(hold: &HoldReport) -> Option<Block> {
     (!rows.is_empty()).then_some(Block::Table { header, rows })
 }
 
-fn peak(peak: &PeakReport) -> String {
+/// A joint's largest value beside its limit.
+pub(super) fn peak(peak: &PeakReport) -> String {
     let angular = |value: f64| format!("{:.1}", value.to_degrees());
     let (what, value, limit, unit) = match peak.criterion {
         "joint_range" => ("position", angular(peak.value), angular(peak.limit), "deg"),

@@ -1,5 +1,6 @@
 //! Tables and lines for a terminal.
 
+pub mod answers;
 pub mod atlas;
 pub(crate) mod budget;
 pub(crate) mod class_words;
@@ -7,6 +8,7 @@ pub mod comparison;
 pub(crate) mod engine_headings;
 pub(crate) mod events;
 pub mod excitation;
+pub mod free;
 pub mod iso9283;
 pub(crate) mod judged;
 pub mod overview;
