@@ -27,7 +27,9 @@ use std::path::Path;
 
 use needlebench_input::Finding;
 
-pub use answers_file::{Answer, AnswersFile, AnswersSource, Asked, Question, read_answers};
+pub use answers_file::{
+    Answer, AnswersFile, AnswersSource, Asked, Question, answers_of, read_answers,
+};
 pub use arm_fit::{ArmFit, arm_fits};
 pub use calibration::{CalibratedLink, CalibrationFit, PoseError, calibrate};
 pub use identify::{
@@ -35,7 +37,9 @@ pub use identify::{
     MeasuredFit, identify,
 };
 pub use lag::{Tracking, tracking};
-pub use motion_file::{Known, MotionFile, MotionOptions, MotionSource, read_motion};
+pub use motion_file::{
+    Known, MotionFile, MotionOptions, MotionSource, motion_of_points, read_motion,
+};
 pub use options::{AngleUnit, EffortMeaning, ReadOptions, TimeUnit};
 pub use quantity::Quantity;
 pub use run::{Effort, Load, LogKind, LogSource, RecordedRun};

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use needlebench_bench::ct::{LastScan, scanned};
 use needlebench_bench::judge::answers::{AnswersOptions, TOLERANCE, judge_answers};
 use needlebench_bench::judge::free::judge_free;
 use needlebench_bench::judge::{JudgeError, JudgeOptions, judge as judge_motion};
@@ -184,7 +185,10 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
     if arguments.wide {
         print_wide();
     }
-    let resolved = load(&arguments.scenario, &overrides(&arguments.robot)?)?;
+    let overrides = overrides(&arguments.robot)?;
+    let resolved = load(&arguments.scenario, &overrides)?;
+    // As a run has it: what the scan of a scenario shows.
+    let resolved = scanned(resolved, &overrides, &mut LastScan::default())?;
     let Some(motion) = &arguments.motion else {
         return answers(arguments, &resolved);
     };

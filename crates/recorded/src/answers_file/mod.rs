@@ -128,6 +128,33 @@ pub fn read_answers(path: &Path) -> Result<AnswersFile, Vec<Finding>> {
     })
 }
 
+/// Answers in memory, to the scenario's goal. `name` stands for the file.
+///
+/// # Errors
+/// A value that is no joint position.
+pub fn answers_of(name: &str, joints: &[Joints]) -> Result<AnswersFile, Finding> {
+    let numbers = joints.iter().flat_map(|each| each.iter());
+    let bytes: Vec<u8> = numbers.flat_map(|number| number.to_le_bytes()).collect();
+    let mut made = Made::default();
+    made.question(Asked::Goal, None);
+    for joints in joints {
+        made.answer(Asked::Goal, None, *joints);
+    }
+    for answer in made.questions.iter().flat_map(|each| &each.answers) {
+        check(name, answer)?;
+    }
+    Ok(AnswersFile {
+        source: AnswersSource {
+            file: name.to_owned(),
+            sha256: sha256_hex(&bytes),
+            format: "array",
+            answers: made.answers,
+        },
+        questions: made.questions,
+        notes: made.notes,
+    })
+}
+
 /// What a reader makes of a file.
 #[derive(Debug, Default)]
 struct Made {

@@ -132,6 +132,29 @@ pub fn read_motion(path: &Path, options: &MotionOptions) -> Result<MotionFile, V
     points.checked(&file, &text, sha256_hex(text.as_bytes()))
 }
 
+/// A motion of points in memory: their times, s, and joint positions, velocities and accelerations; of the latter either
+/// all or none. `name` stands for the file.
+///
+/// # Errors
+/// What is wrong with a point, as of a file.
+pub fn motion_of_points(
+    name: &str,
+    times_s: Vec<f64>,
+    values: [Vec<Joints>; 3],
+) -> Result<MotionFile, Vec<Finding>> {
+    let of_joints = values.iter().flatten().flat_map(|joints| joints.iter());
+    let numbers = times_s.iter().chain(of_joints);
+    let bytes: Vec<u8> = numbers.flat_map(|number| number.to_le_bytes()).collect();
+    let points = Points {
+        format: "arrays",
+        times_s,
+        values,
+        places: Vec::new(),
+        notes: Vec::new(),
+    };
+    points.checked(name, "", sha256_hex(&bytes))
+}
+
 /// Whether a text is a table: its name says so, or its first line is a header of columns.
 fn is_table(path: &Path, text: &str) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str());
@@ -167,8 +190,11 @@ impl Points {
         sha256: String,
     ) -> Result<MotionFile, Vec<Finding>> {
         let at = |point: usize, message: String| {
-            let place = self.places.get(point).copied().unwrap_or(0);
-            Finding::new(file, format!("point {}: {message}", point + 1)).at(text, place..place)
+            let finding = Finding::new(file, format!("point {}: {message}", point + 1));
+            match self.places.get(point) {
+                Some(place) => finding.at(text, *place..*place),
+                None => finding,
+            }
         };
         if self.values[0].len() < 2 {
             let message = format!(
