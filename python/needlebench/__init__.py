@@ -24,6 +24,7 @@ from ._errors import (
     Interrupted,
     NeedlebenchError,
 )
+from ._judge import judge, judge_answers, judge_free
 from ._kinematics import Arm, ForwardKinematics, Poses, Solution, Solutions, fk, solve
 from ._native import (
     ARMS,
@@ -87,6 +88,9 @@ __all__ = [
     "ct",
     "fk",
     "ik",
+    "judge",
+    "judge_answers",
+    "judge_free",
     "merge",
     "solve",
     "study",

@@ -158,6 +158,45 @@ class Scenario:
         progress: _Progress | None = None,
     ) -> tuple[Run, BaseException | None]: ...
 
+def judge(
+    scenario: Scenario,
+    times_s: npt.ArrayLike,
+    positions_rad: npt.ArrayLike,
+    velocities_rad_s: npt.ArrayLike | None = None,
+    accelerations_rad_s2: npt.ArrayLike | None = None,
+    *,
+    goal: str | None = None,
+    between: str | None = None,
+    any_start: bool = False,
+    beside: bool = True,
+    engines: list[str] | None = None,
+    jobs: int | None = None,
+    reference: bool = False,
+    out: _Path | None = None,
+    pictures: bool = True,
+    page: bool = True,
+    progress: _Progress | None = None,
+) -> tuple[Run, BaseException | None]: ...
+def judge_free(
+    scenario: Scenario,
+    times_s: npt.ArrayLike,
+    positions_rad: npt.ArrayLike,
+    velocities_rad_s: npt.ArrayLike | None = None,
+    accelerations_rad_s2: npt.ArrayLike | None = None,
+    *,
+    between: str | None = None,
+) -> str: ...
+def judge_answers(
+    scenario: Scenario,
+    joints_rad: npt.ArrayLike,
+    *,
+    goal: str | None = None,
+    tolerance: float | None = None,
+    partial: bool = False,
+    jobs: int | None = None,
+    progress: _Progress | None = None,
+) -> str: ...
+
 @final
 class Run:
     def report_json(self) -> str: ...

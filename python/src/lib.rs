@@ -9,6 +9,7 @@ mod arrays;
 mod background;
 mod errors;
 mod ik;
+mod judge;
 mod run;
 mod scenario;
 
@@ -22,6 +23,8 @@ mod _native {
     use crate::background::{invoke, main};
     #[pymodule_export]
     use crate::ik::{IkAnswers, ik};
+    #[pymodule_export]
+    use crate::judge::{judge, judge_answers, judge_free};
     #[pymodule_export]
     use crate::run::Run;
     #[pymodule_export]

@@ -14,7 +14,7 @@ use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_report::files::{Folder, RunFiles, write_run};
 use needlebench_scenario::scenario::EngineName;
-use needlebench_scenario::{Overrides, load_scenario};
+use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -27,9 +27,9 @@ use crate::run::Run;
 /// A validated scenario.
 #[pyclass(frozen, module = "needlebench._native")]
 pub(crate) struct Scenario {
-    runnable: Arc<Runnable>,
+    pub(crate) runnable: Arc<Runnable>,
     model: Arc<ClearanceModel>,
-    overrides: Arc<Overrides>,
+    pub(crate) overrides: Arc<Overrides>,
 }
 
 #[pymethods]
@@ -238,12 +238,9 @@ impl Scenario {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Run, Option<Py<PyAny>>)> {
         let engines = engines.map(|names| names.into_iter().map(EngineName).collect());
-        let threads = jobs.unwrap_or_else(|| {
-            std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
-        });
         let options = RunOptions {
             engines,
-            jobs: threads.max(1),
+            jobs: threads(jobs),
             referee: reference,
             ..RunOptions::default()
         };
@@ -262,11 +259,13 @@ impl Scenario {
         let job = Job {
             runnable: Arc::clone(&self.runnable),
             overrides: Arc::clone(&self.overrides),
-            folder: out.map(|out| out.join(self.name())),
+            results: Results {
+                folder: out.map(|out| out.join(self.name())),
+                pictures,
+                page,
+                mcap: record.is_some(),
+            },
             options,
-            pictures,
-            page,
-            mcap: record.is_some(),
         };
         let done = in_background(py, progress, move |task| job.run(task))?;
         match done.value {
@@ -283,26 +282,80 @@ impl Scenario {
     }
 }
 
+/// Threads of a call: as many as asked for, else all.
+pub(crate) fn threads(jobs: Option<usize>) -> usize {
+    let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    jobs.unwrap_or_else(all).max(1)
+}
+
 /// A run, on its own thread.
 struct Job {
     runnable: Arc<Runnable>,
     overrides: Arc<Overrides>,
-    folder: Option<PathBuf>,
+    results: Results,
     options: RunOptions,
-    pictures: bool,
-    page: bool,
-    mcap: bool,
+}
+
+/// Where results are written, and which; nowhere without a folder.
+pub(crate) struct Results {
+    pub folder: Option<PathBuf>,
+    pub pictures: bool,
+    pub page: bool,
+    pub mcap: bool,
+}
+
+impl Results {
+    /// Makes the folder, before anything long starts.
+    pub(crate) fn prepare(&self) -> Result<(), Failure> {
+        let Some(folder) = &self.folder else {
+            return Ok(());
+        };
+        std::fs::create_dir_all(folder).map_err(|error| {
+            let message = format!("the results folder cannot be written: {error}");
+            let finding = Finding::new(folder.display().to_string(), message);
+            Failure::Input(vec![finding.key("out").hint("choose another folder")])
+        })
+    }
+
+    /// Writes the results of a run, whose report then names the files.
+    pub(crate) fn write(
+        &self,
+        resolved: &ResolvedScenario,
+        finished: &mut ScenarioRun,
+        jobs: usize,
+        task: &Task,
+    ) -> Result<(), Failure> {
+        let Some(folder) = &self.folder else {
+            return Ok(());
+        };
+        let files = RunFiles {
+            rtde: false,
+            mcap: self.mcap,
+            pictures: self.pictures,
+            page: self.page,
+            jobs,
+            cancel: &task.cancel,
+            engines: ENGINES,
+        };
+        let progress = task.progress.as_ref();
+        finished.report =
+            write_run(resolved, finished, Folder(folder), files, progress).map_err(|error| {
+                let folder = folder.display();
+                Failure::Environment(format!("cannot write the results to {folder}: {error}"))
+            })?;
+        Ok(())
+    }
 }
 
 /// Failures of a run.
-enum Failure {
+pub(crate) enum Failure {
     Input(Vec<Finding>),
     Environment(String),
     Interrupted,
 }
 
 impl Failure {
-    fn into_exception(self, py: Python<'_>) -> PyErr {
+    pub(crate) fn into_exception(self, py: Python<'_>) -> PyErr {
         match self {
             Self::Input(findings) => input_error(py, &findings),
             Self::Environment(message) => environment_failed(py, &message),
@@ -313,13 +366,7 @@ impl Failure {
 
 impl Job {
     fn run(self, task: &Task) -> Result<(Arc<Runnable>, ScenarioRun), Failure> {
-        if let Some(folder) = &self.folder {
-            std::fs::create_dir_all(folder).map_err(|error| {
-                let message = format!("the results folder cannot be written: {error}");
-                let finding = Finding::new(folder.display().to_string(), message);
-                Failure::Input(vec![finding.key("out").hint("choose another folder")])
-            })?;
-        }
+        self.results.prepare()?;
         let runnable = self.scanned(task)?;
         let mut finished = needlebench_bench::run(
             &runnable,
@@ -328,28 +375,8 @@ impl Job {
             task.progress.as_ref(),
         )
         .map_err(|error| Failure::Environment(error.to_string()))?;
-        if let Some(folder) = &self.folder {
-            let files = RunFiles {
-                rtde: false,
-                mcap: self.mcap,
-                pictures: self.pictures,
-                page: self.page,
-                jobs: self.options.jobs,
-                cancel: &task.cancel,
-                engines: ENGINES,
-            };
-            finished.report = write_run(
-                runnable.scenario(),
-                &finished,
-                Folder(folder),
-                files,
-                task.progress.as_ref(),
-            )
-            .map_err(|error| {
-                let folder = folder.display();
-                Failure::Environment(format!("cannot write the results to {folder}: {error}"))
-            })?;
-        }
+        self.results
+            .write(runnable.scenario(), &mut finished, self.options.jobs, task)?;
         Ok((runnable, finished))
     }
 
@@ -360,7 +387,7 @@ impl Job {
             return Ok(Arc::clone(&self.runnable));
         }
         let refused = Failure::Input;
-        let resolved = match &self.folder {
+        let resolved = match &self.results.folder {
             None => scanned(resolved.clone(), &self.overrides, &mut LastScan::default())
                 .map_err(refused)?,
             Some(folder) => {
