@@ -83,6 +83,23 @@ def test_a_motion_to_no_goal_has_its_clearances(table3: nb.Scenario) -> None:
         assert report["clearance"][name]["minimum_m"] == pytest.approx(least, abs=2e-4)
 
 
+def test_set_points_at_the_controllers_rate_need_no_velocities(table3: nb.Scenario) -> None:
+    plan = table3.plan()["pose"]["Right-Up-Fold"]
+    duration = plan.duration_s()
+    assert duration is not None
+
+    def failed(period: float) -> list[str]:
+        times = np.append(np.arange(0.0, duration, period), duration)
+        # The last step is as long as the others, or longer.
+        times = np.delete(times, -2)
+        report = nb.judge_free(table3, times, plan.motion(times)["position_rad"])
+        return [each["criterion"] for each in report["criteria"] if not each["pass"]]
+
+    # A UR3 of the CB3 series takes set-points every 8 ms.
+    assert failed(0.008) == []
+    assert failed(0.04) == ["joint_acceleration"]
+
+
 def test_answers_are_those_of_the_command_line(
     table3: nb.Scenario, command_line: CommandLine, scenarios: Path, tmp_path: Path
 ) -> None:

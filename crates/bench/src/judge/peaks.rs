@@ -6,8 +6,11 @@ use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 use needlebench_scenario::ResolvedScenario;
 
-/// Time between two looks at a motion, s, at most; a cycle of the controller.
-const CYCLE_S: f64 = 2e-3;
+/// Time between two looks at a motion, s, at most.
+const LOOK_S: f64 = 2e-3;
+
+/// Time between two set-points of a controller of which the arm's data do not say it, s: the e-Series'.
+const PERIOD_S: f64 = 2e-3;
 
 /// Differences that rounding makes, relative to the limit.
 const ROUNDING: f64 = 1e-9;
@@ -33,10 +36,10 @@ impl Peak {
 
 /// The peak of each quantity along a motion, from `times_s` (ascending, of its points) and at least every 2 ms between.
 ///
-/// Velocities at the two sides of a point may differ; the jump counts as an acceleration over one cycle of the
-/// controller, 2 ms, and so does motion at the ends, before and after which the arm stands. The limit of accelerations is
-/// that of the scenario's `[motion]` and 2 % for curves that overshoot between points. Torques are those of the
-/// rigid arm with its tool, without friction.
+/// Velocities at the two sides of a point may differ; the jump counts as an acceleration over the time between two
+/// set-points of the arm's controller, and so does motion at the ends, before and after which the arm stands. The limit of
+/// accelerations is that of the scenario's `[motion]` and 2 % for curves that overshoot between points. Torques are those
+/// of the rigid arm with its tool, without friction.
 pub(crate) fn peaks(
     resolved: &ResolvedScenario,
     motion: &JointTrajectory,
@@ -46,6 +49,7 @@ pub(crate) fn peaks(
     let limits = &resolved.cell.robot.limits;
     let (speeds, torques) = (limits.velocities_rad_s(), limits.efforts_nm());
     let accelerations = resolved.motion.acceleration * (1.0 + OVERSHOOT);
+    let period_s = period_s(resolved);
     let dynamics = resolved.cell.dynamics();
     let mut least: Option<(f64, Peak)> = None;
     let [mut speed, mut acceleration, mut torque]: [Option<Peak>; 3] = [None; 3];
@@ -90,7 +94,7 @@ pub(crate) fn peaks(
             &accelerations,
             time_s,
         );
-        let jump = (state.velocity - before) / CYCLE_S;
+        let jump = (state.velocity - before) / period_s;
         if is_point {
             note(&mut acceleration, &jump, &accelerations, time_s);
         }
@@ -101,7 +105,7 @@ pub(crate) fn peaks(
     }
     note(
         &mut acceleration,
-        &(before / CYCLE_S),
+        &(before / period_s),
         &accelerations,
         duration_s,
     );
@@ -127,6 +131,13 @@ pub(crate) fn peaks(
     }));
     found.extend(torque.map(|peak| report(peak, "joint_torque", "N m", "torque of the joint")));
     found
+}
+
+/// Time between two set-points of the arm's controller, s.
+fn period_s(resolved: &ResolvedScenario) -> f64 {
+    let used = resolved.robot_description.arm.as_ref();
+    let control = used.and_then(|used| used.arm.data.control.as_ref());
+    control.map_or(PERIOD_S, |control| control.period_ms * 1e-3)
 }
 
 /// A criterion for each peak.
@@ -172,7 +183,7 @@ fn times_s(points_s: &[f64], duration_s: f64) -> Vec<(f64, bool)> {
     ends.push(duration_s);
     let mut all = Vec::new();
     for pair in ends.windows(2) {
-        let parts = ((pair[1] - pair[0]) / CYCLE_S).ceil().max(1.0);
+        let parts = ((pair[1] - pair[0]) / LOOK_S).ceil().max(1.0);
         let mut part = 0.0;
         while part < parts {
             all.push((pair[0] + (pair[1] - pair[0]) * part / parts, part == 0.0));

@@ -62,10 +62,10 @@ pub(crate) struct JudgeArguments {
     #[arg(long, value_name = "FILE", conflicts_with = "motion")]
     pub answers: Option<PathBuf>,
     /// Largest distance (m) and angle (rad) of a right answer [default: 1e-4].
-    #[arg(long, value_name = "M_AND_RAD", requires = "answers", value_parser = tolerance)]
+    #[arg(long, value_name = "M_AND_RAD", conflicts_with = "motion", value_parser = tolerance)]
     pub tolerance: Option<f64>,
     /// One right answer is enough: missing ones are listed, and do not fail.
-    #[arg(long, requires = "answers")]
+    #[arg(long, conflicts_with = "motion")]
     pub partial: bool,
     /// Judge clearances and joints alone, wherever the motion leads; nothing is simulated.
     #[arg(long, conflicts_with_all = ["goal", "answers", "engine", "referee", "no_page"])]

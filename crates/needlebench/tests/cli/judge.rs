@@ -184,7 +184,10 @@ fn answers_are_judged_against_the_complete_set() {
         ),
         ("--answers all.json --engine rapier", "cannot be used with"),
         ("--answers all.json --tolerance 0", "above 0 and at most 1"),
-        ("--motion straight_line.yaml --partial", "--answers"),
+        (
+            "--motion straight_line.yaml --partial",
+            "cannot be used with",
+        ),
         ("", "--motion <FILE>"),
     ] {
         let answer = bench
@@ -203,7 +206,9 @@ fn a_motion_to_no_goal_is_judged_by_its_clearances() {
     bench.write("half.yaml", &half[..=end]);
     let quiet = "--engine rapier --no-pictures --no-page --quiet";
     bench
-        .run(format!("judge table3.toml --motion half.yaml {quiet}"))
+        .run(format!(
+            "judge table3.toml --motion half.yaml --out held {quiet}"
+        ))
         .exits_with(2)
         .complains(["stands at no goal", "--free"]);
     let answer = bench.run("judge table3.toml --motion half.yaml --free --junit junit.xml --json");
