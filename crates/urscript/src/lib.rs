@@ -3,5 +3,6 @@
 
 mod lexer;
 mod place;
+pub mod tree;
 
 pub use place::{Place, ScriptError};
