@@ -4,9 +4,14 @@
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod lexer;
+mod motion;
+mod operators;
 mod parser;
 mod place;
 pub mod tree;
+mod value;
 
+pub use motion::{Arm, Belief, Motion, MotionKind, Pace};
 pub use parser::{MOST_BYTES, MOST_LEVELS, parse};
 pub use place::{Place, ScriptError};
+pub use value::Value;
