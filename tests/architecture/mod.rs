@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Every crate under `crates/`, the Python package, and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 33] = [
+const LAYERS: [(&str, &[&str]); 34] = [
     ("elementary", &[]),
     ("parallel", &[]),
     ("numerics", &[]),
@@ -60,6 +60,7 @@ const LAYERS: [(&str, &[&str]); 33] = [
     ),
     ("study", &["scenario", "input", "kinematics", "numerics"]),
     ("ros", &[]),
+    ("urscript", &["kinematics"]),
     (
         "recorded",
         &["ros", "scenario", "cell", "input", "kinematics"],

@@ -1,0 +1,750 @@
+//! Programs whose course constants decide: what they do, one after the other.
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use needlebench_kinematics::Pose;
+
+use crate::builtin::{Builtin, Call, Does, builtin};
+use crate::lexer::shortened;
+use crate::load::{Entry, Load};
+use crate::motion::{Arm, Belief, Motion, MotionKind};
+use crate::place::{Place, ScriptError};
+use crate::tree::{
+    Argument, Expression, ExpressionKind, FunctionKind, Part, Program, Scope, Statement,
+    StatementKind, Target,
+};
+use crate::value::{Value, checked_size, list};
+
+/// Most steps of a program: an hour of set-points every 2 ms takes fewer.
+pub const MOST_STEPS: u64 = 5_000_000;
+
+/// Most functions that wait for each other's return.
+const MOST_CALLS: usize = 200;
+
+/// Most blocks, expressions and calls within each other while a program runs.
+const MOST_DEPTH: usize = 1000;
+
+/// Most notes of different texts, most lines that one counts, and most that it names.
+const MOST_NOTES: usize = 50;
+const MOST_COUNTED: usize = 100;
+const MOST_LINES: usize = 5;
+
+/// Steps that a call of a built-in function counts for.
+const CALL_STEPS: usize = 20;
+
+/// What a program does not say.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Installation {
+    /// The tool's point in the flange's frame until the program sets one.
+    pub flange_from_tcp: Option<Pose>,
+}
+
+/// What came of a program, besides its motions.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Outcome {
+    /// What the controller believes at the end.
+    pub belief: Belief,
+    /// Motions that the arm was given.
+    pub motions: usize,
+    /// What was not simulated or is to be known, with the lines.
+    pub notes: Vec<String>,
+}
+
+/// Does what a program does, and gives its motions to the arm.
+///
+/// # Errors
+/// What is wrong in the program, what depends on more than constants, and what the arm refuses; with its place.
+pub fn evaluate(
+    program: &Program,
+    arm: &mut dyn Arm,
+    installation: &Installation,
+) -> Result<Outcome, ScriptError> {
+    let load = Load::new(program)?;
+    let (function, body) = match load.entry {
+        Entry::Statements(statements) => (None, statements),
+        Entry::Function(index) => {
+            let function = load.functions[index].function;
+            if let Some((name, _)) = function.parameters.iter().find(|each| each.1.is_none()) {
+                let message = format!(
+                    "the program `{}` is given no `{}`",
+                    shortened(&function.name),
+                    shortened(name)
+                );
+                return Err(ScriptError::new(Place::START, message));
+            }
+            (Some(index), function.body.as_slice())
+        }
+    };
+    let mut evaluator = Evaluator {
+        load: &load,
+        arm,
+        installation,
+        globals: BTreeMap::new(),
+        frames: vec![Frame {
+            function,
+            locals: None,
+        }],
+        belief: Belief::default(),
+        has_moved: false,
+        is_blended: false,
+        motions: 0,
+        notes: Vec::new(),
+        steps: 0,
+        depth: 0,
+    };
+    if let Some(index) = function {
+        for (name, value) in &load.functions[index].function.parameters {
+            if let Some(value) = value {
+                let value = evaluator.expression(value)?;
+                evaluator.globals.insert(name, value);
+            }
+        }
+    }
+    evaluator.statements(body)?;
+    Ok(Outcome {
+        belief: evaluator.belief,
+        motions: evaluator.motions,
+        notes: evaluator.notes.into_iter().map(Note::into_text).collect(),
+    })
+}
+
+/// A note with the lines that it is about.
+struct Note {
+    text: String,
+    lines: Vec<usize>,
+}
+
+impl Note {
+    fn into_text(self) -> String {
+        let some: Vec<String> = self
+            .lines
+            .iter()
+            .take(MOST_LINES)
+            .map(usize::to_string)
+            .collect();
+        let lines = if self.lines.len() == 1 {
+            "line"
+        } else {
+            "lines"
+        };
+        let more = match self.lines.len().saturating_sub(MOST_LINES) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        format!("{} ({lines} {}{more})", self.text, some.join(", "))
+    }
+}
+
+/// A function that is being done.
+struct Frame<'p> {
+    function: Option<usize>,
+    /// Names of its own; none at the program's first level, whose names are global.
+    locals: Option<BTreeMap<&'p str, Value>>,
+}
+
+/// What follows a statement.
+enum Flow {
+    On,
+    Break,
+    Continue,
+    Return(Value),
+    Halt,
+}
+
+/// A program that is being done.
+pub(crate) struct Evaluator<'p, 'a> {
+    load: &'p Load<'p>,
+    pub arm: &'a mut dyn Arm,
+    installation: &'a Installation,
+    globals: BTreeMap<&'p str, Value>,
+    frames: Vec<Frame<'p>>,
+    pub belief: Belief,
+    /// The arm was given a motion.
+    pub has_moved: bool,
+    /// The last motion has a blend radius.
+    pub is_blended: bool,
+    motions: usize,
+    notes: Vec<Note>,
+    steps: u64,
+    depth: usize,
+}
+
+impl<'p> Evaluator<'p, '_> {
+    /// Adds a note, or its line to the note of the same text.
+    pub fn note(&mut self, place: Place, text: &str) {
+        let known = self.notes.iter_mut().find(|note| note.text == text);
+        if let Some(note) = known {
+            if note.lines.len() < MOST_COUNTED && !note.lines.contains(&place.line) {
+                note.lines.push(place.line);
+            }
+        } else if self.notes.len() < MOST_NOTES {
+            self.notes.push(Note {
+                text: text.to_owned(),
+                lines: vec![place.line],
+            });
+        }
+    }
+
+    /// Why something that a program does is not evaluated.
+    #[expect(clippy::unused_self, reason = "said of this evaluation")]
+    pub fn refused(&self, place: Place, name: &str, reason: &str) -> ScriptError {
+        let message = format!("`{name}` {reason}: only fixed arguments are judged");
+        ScriptError::new(place, message)
+            .hint("run the program in the controller's simulator, and judge its RTDE log")
+    }
+
+    /// The tool's point in the flange's frame.
+    pub fn tcp(&self, place: Place) -> Result<Pose, ScriptError> {
+        let known = self
+            .belief
+            .flange_from_tcp
+            .or(self.installation.flange_from_tcp);
+        known.ok_or_else(|| {
+            let message =
+                "the program sets no TCP before this, and that of the installation is not known";
+            ScriptError::new(place, message)
+                .hint("add set_tcp(p[...]) to the program, or say with --tcp which point it is")
+        })
+    }
+
+    /// Gives the arm a motion.
+    pub fn perform(&mut self, motion: &Motion) -> Result<(), ScriptError> {
+        self.arm.perform(motion)?;
+        self.motions += 1;
+        self.has_moved |= !matches!(
+            motion.kind,
+            MotionKind::Stand { .. } | MotionKind::Stop { .. }
+        );
+        self.is_blended = match motion.kind {
+            MotionKind::Joints { blend_m, .. }
+            | MotionKind::Line { blend_m, .. }
+            | MotionKind::Process { blend_m, .. } => blend_m > 0.0,
+            _ => false,
+        };
+        Ok(())
+    }
+
+    fn step(&mut self, place: Place, steps: usize) -> Result<(), ScriptError> {
+        self.steps += steps as u64;
+        if self.steps <= MOST_STEPS {
+            return Ok(());
+        }
+        let message = format!("the program takes more than {MOST_STEPS} steps");
+        Err(ScriptError::new(place, message)
+            .hint("does a loop never end? only programs that end are judged"))
+    }
+
+    fn deeper<T>(
+        &mut self,
+        place: Place,
+        part: impl FnOnce(&mut Self) -> Result<T, ScriptError>,
+    ) -> Result<T, ScriptError> {
+        if self.depth >= MOST_DEPTH {
+            let message =
+                format!("calls, blocks and expressions are more than {MOST_DEPTH} levels deep");
+            return Err(ScriptError::new(place, message));
+        }
+        self.depth += 1;
+        let found = part(self);
+        self.depth -= 1;
+        found
+    }
+
+    fn statements(&mut self, statements: &'p [Statement]) -> Result<Flow, ScriptError> {
+        for statement in statements {
+            self.step(statement.place, 1)?;
+            match self.deeper(statement.place, |inside| inside.statement(statement))? {
+                Flow::On => {}
+                other => return Ok(other),
+            }
+        }
+        Ok(Flow::On)
+    }
+
+    fn statement(&mut self, statement: &'p Statement) -> Result<Flow, ScriptError> {
+        match &statement.kind {
+            StatementKind::Function(_)
+            | StatementKind::Pass
+            | StatementKind::EnterCritical
+            | StatementKind::ExitCritical => {}
+            StatementKind::If {
+                branches,
+                otherwise,
+            } => {
+                for (condition, body) in branches {
+                    if self.truth(condition)? {
+                        return self.statements(body);
+                    }
+                }
+                return self.statements(otherwise);
+            }
+            StatementKind::While { condition, body } => {
+                while self.truth(condition)? {
+                    self.step(statement.place, 1)?;
+                    match self.statements(body)? {
+                        Flow::On | Flow::Continue => {}
+                        Flow::Break => break,
+                        other => return Ok(other),
+                    }
+                }
+            }
+            StatementKind::Return(value) => {
+                let value = match value {
+                    Some(value) => self.expression(value)?,
+                    None => Value::Nothing,
+                };
+                return Ok(Flow::Return(value));
+            }
+            StatementKind::Break => return Ok(Flow::Break),
+            StatementKind::Continue => return Ok(Flow::Continue),
+            StatementKind::Halt => return Ok(Flow::Halt),
+            StatementKind::Declare { scope, name, value } => {
+                let value = match value {
+                    Some(value) => self.something(value)?,
+                    None => Value::Nothing,
+                };
+                let locals = self
+                    .frames
+                    .last_mut()
+                    .and_then(|frame| frame.locals.as_mut());
+                match (scope, locals) {
+                    (Scope::Local, Some(locals)) => {
+                        locals.insert(name, value);
+                    }
+                    (Scope::Global, Some(locals)) => {
+                        locals.remove(name.as_str());
+                        self.globals.insert(name, value);
+                    }
+                    (_, None) => {
+                        self.globals.insert(name, value);
+                    }
+                }
+            }
+            StatementKind::Assign { target, value } => {
+                let value = self.something(value)?;
+                self.assign(statement.place, target, value)?;
+            }
+            StatementKind::Kill(handle) => {
+                // No thread runs that could end.
+                self.something(handle)?;
+            }
+            StatementKind::Join(_) => {
+                return Err(self.refused(statement.place, "join", "waits for a thread"));
+            }
+            StatementKind::Expression(expression) => {
+                // What a call gives is dropped; a `halt` inside a function ends everything.
+                if let ExpressionKind::Call { name, arguments } = &expression.kind {
+                    return match self.call(expression.place, name, arguments)? {
+                        Called::Value(_) => Ok(Flow::On),
+                        Called::Halt => Ok(Flow::Halt),
+                    };
+                }
+                self.expression(expression)?;
+            }
+        }
+        Ok(Flow::On)
+    }
+
+    fn truth(&mut self, condition: &'p Expression) -> Result<bool, ScriptError> {
+        match self.expression(condition)? {
+            Value::Truth(truth) => Ok(truth),
+            other => {
+                let message = format!("the condition is {}, and no truth value", other.kind());
+                Err(ScriptError::new(condition.place, message))
+            }
+        }
+    }
+
+    /// The variable of a name, where it is looked for from the present function.
+    fn variable(&mut self, name: &str) -> Option<&mut Value> {
+        let locals = self
+            .frames
+            .last_mut()
+            .and_then(|frame| frame.locals.as_mut());
+        if let Some(found) = locals.and_then(|locals| locals.get_mut(name)) {
+            return Some(found);
+        }
+        self.globals.get_mut(name)
+    }
+
+    fn assign(
+        &mut self,
+        place: Place,
+        target: &'p Target,
+        value: Value,
+    ) -> Result<(), ScriptError> {
+        if target.parts.is_empty() {
+            match self.variable(&target.name) {
+                Some(known) => *known = value,
+                None => match self
+                    .frames
+                    .last_mut()
+                    .and_then(|frame| frame.locals.as_mut())
+                {
+                    Some(locals) => {
+                        locals.insert(&target.name, value);
+                    }
+                    None => {
+                        self.globals.insert(&target.name, value);
+                    }
+                },
+            }
+            return Ok(());
+        }
+        let mut indices: Vec<usize> = Vec::new();
+        for part in &target.parts {
+            let Part::Element(parts) = part else {
+                return Err(self.refused(place, "struct", "is not evaluated"));
+            };
+            for index in parts {
+                indices.push(self.index(index)?);
+            }
+        }
+        let wrong = |message: String| ScriptError::new(place, message);
+        let Some(variable) = self.variable(&target.name) else {
+            let message = format!("`{}` has no value yet", shortened(&target.name));
+            return Err(wrong(message));
+        };
+        let copied = replace(variable, &indices, value).map_err(wrong)?;
+        self.step(place, copied)
+    }
+
+    fn index(&mut self, index: &'p Expression) -> Result<usize, ScriptError> {
+        match self.expression(index)? {
+            Value::Number(number) if number >= 0.0 && number.fract() == 0.0 && number < 1e9 => {
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "whole, and between 0 and 1e9"
+                )]
+                let index = number as usize;
+                Ok(index)
+            }
+            other => {
+                let message = format!(
+                    "{} is no index: they are whole numbers from 0",
+                    other.text()
+                );
+                Err(ScriptError::new(index.place, shortened(&message)))
+            }
+        }
+    }
+
+    /// A value that is not nothing.
+    fn something(&mut self, expression: &'p Expression) -> Result<Value, ScriptError> {
+        match self.expression(expression)? {
+            Value::Nothing => {
+                let message = "the function gives nothing, where a value is needed";
+                Err(ScriptError::new(expression.place, message))
+            }
+            value => Ok(value),
+        }
+    }
+
+    fn expression(&mut self, expression: &'p Expression) -> Result<Value, ScriptError> {
+        self.step(expression.place, 1)?;
+        self.deeper(expression.place, |inside| inside.value_of(expression))
+    }
+
+    fn values(&mut self, all: &'p [Expression]) -> Result<Vec<Value>, ScriptError> {
+        all.iter().map(|each| self.something(each)).collect()
+    }
+
+    fn value_of(&mut self, expression: &'p Expression) -> Result<Value, ScriptError> {
+        let place = expression.place;
+        match &expression.kind {
+            ExpressionKind::Number(number) => Ok(Value::Number(*number)),
+            ExpressionKind::Text(text) => {
+                crate::value::text(text).map_err(|message| ScriptError::new(place, message))
+            }
+            ExpressionKind::Truth(truth) => Ok(Value::Truth(*truth)),
+            ExpressionKind::Name(name) => match self.variable(name) {
+                None | Some(Value::Nothing) => {
+                    let message = format!("`{}` has no value here", shortened(name));
+                    Err(ScriptError::new(place, message))
+                }
+                Some(value) => Ok(value.clone()),
+            },
+            ExpressionKind::Call { name, arguments } => match self.call(place, name, arguments)? {
+                Called::Value(value) => Ok(value),
+                Called::Halt => {
+                    let message = "`halt` in a function whose value is needed";
+                    Err(ScriptError::new(place, message))
+                }
+            },
+            ExpressionKind::Run { name, .. } => {
+                let from = self.frames.last().and_then(|frame| frame.function);
+                let thread = self.load.function(from, name);
+                if thread.is_some_and(|index| self.load.counting.contains(&index)) {
+                    let text = "threads that only count are not run";
+                    self.note(place, text);
+                    return Ok(Value::Number(0.0));
+                }
+                Err(self.refused(place, "run", "starts a thread"))
+            }
+            ExpressionKind::Member { name, .. } => {
+                let name = shortened(name);
+                Err(self.refused(place, &name, "belongs to a struct or a remote program"))
+            }
+            ExpressionKind::Element { of, indices } => {
+                let of = self.something(of)?;
+                let mut found = of;
+                for index in indices {
+                    let at = self.index(index)?;
+                    found = element(&found, at)
+                        .map_err(|message| ScriptError::new(index.place, message))?;
+                }
+                Ok(found)
+            }
+            ExpressionKind::Pose(parts) => {
+                let values = self.values(parts)?;
+                let mut numbers = [0.0; 6];
+                for ((number, value), part) in numbers.iter_mut().zip(values).zip(parts) {
+                    let Value::Number(found) = value else {
+                        let message =
+                            format!("{} in a pose, where a number is needed", value.kind());
+                        return Err(ScriptError::new(part.place, message));
+                    };
+                    *number = found;
+                }
+                Ok(Value::Pose(Rc::new(numbers)))
+            }
+            ExpressionKind::List(parts) => {
+                let values = self.values(parts)?;
+                let (value, size) =
+                    list(values).map_err(|message| ScriptError::new(place, message))?;
+                self.step(place, size)?;
+                Ok(value)
+            }
+            ExpressionKind::Unary { operator, operand } => {
+                let operand = self.something(operand)?;
+                self.step(place, elements(&operand))?;
+                crate::operators::unary(*operator, operand)
+                    .map_err(|message| ScriptError::new(place, message))
+            }
+            ExpressionKind::Binary {
+                operator,
+                left,
+                right,
+            } => {
+                let left = self.something(left)?;
+                if let Some(decided) = crate::operators::decided(*operator, &left) {
+                    return Ok(decided);
+                }
+                let right = self.something(right)?;
+                self.step(place, elements(&left) + elements(&right))?;
+                crate::operators::binary(*operator, &left, &right)
+                    .map_err(|message| ScriptError::new(place, message))
+            }
+        }
+    }
+
+    fn call(
+        &mut self,
+        place: Place,
+        name: &str,
+        arguments: &'p [Argument],
+    ) -> Result<Called, ScriptError> {
+        let from = self.frames.last().and_then(|frame| frame.function);
+        if let Some(index) = self.load.function(from, name) {
+            return self.call_own(place, index, arguments);
+        }
+        let Some(builtin) = builtin(name) else {
+            let message = format!("`{}` is not known here", shortened(name));
+            return Err(ScriptError::new(place, message));
+        };
+        let function = match builtin.does {
+            Does::Refused(reason) => {
+                return Err(self.refused(place, builtin.name, reason.in_words()));
+            }
+            Does::Nothing(note) => {
+                for argument in arguments {
+                    self.something(&argument.value)?;
+                }
+                self.note(place, note);
+                return Ok(Called::Value(Value::Nothing));
+            }
+            Does::Evaluate(function) => function,
+        };
+        let values = self.bind(place, &builtin, arguments)?;
+        let lists = values.iter().flatten().map(elements);
+        self.step(place, CALL_STEPS + lists.sum::<usize>())?;
+        let call = Call::new(place, &builtin, values);
+        self.deeper(place, |inside| function(inside, &call))
+            .map(Called::Value)
+    }
+
+    /// Values of a call by the parameters of what it calls.
+    fn bind(
+        &mut self,
+        place: Place,
+        builtin: &Builtin,
+        arguments: &'p [Argument],
+    ) -> Result<Vec<Option<Value>>, ScriptError> {
+        let names: Vec<&str> = builtin.parameters.to_vec();
+        let values = self.bound(place, builtin.name, &names, arguments)?;
+        let missing = values
+            .iter()
+            .take(builtin.required)
+            .position(Option::is_none);
+        if let Some(missing) = missing {
+            let message = format!("{}: `{}` is missing", builtin.name, names[missing]);
+            return Err(ScriptError::new(place, message));
+        }
+        Ok(values)
+    }
+
+    fn bound(
+        &mut self,
+        place: Place,
+        function: &str,
+        names: &[&str],
+        arguments: &'p [Argument],
+    ) -> Result<Vec<Option<Value>>, ScriptError> {
+        let mut values: Vec<Option<Value>> = vec![None; names.len()];
+        for (position, argument) in arguments.iter().enumerate() {
+            let index = match &argument.name {
+                None => (position < names.len()).then_some(position),
+                Some(name) => names.iter().position(|each| each == name),
+            };
+            let Some(index) = index else {
+                let message = match &argument.name {
+                    Some(name) => format!("{function} has no parameter `{}`", shortened(name)),
+                    None => format!("{function} takes {} at most", count(names.len())),
+                };
+                return Err(ScriptError::new(argument.value.place, message));
+            };
+            if values[index].is_some() {
+                let message = format!("{function}: `{}` is given twice", names[index]);
+                return Err(ScriptError::new(place, message));
+            }
+            values[index] = Some(self.something(&argument.value)?);
+        }
+        Ok(values)
+    }
+
+    fn call_own(
+        &mut self,
+        place: Place,
+        index: usize,
+        arguments: &'p [Argument],
+    ) -> Result<Called, ScriptError> {
+        let function = self.load.functions[index].function;
+        match function.kind {
+            FunctionKind::Function => {}
+            FunctionKind::Thread => return Err(self.refused(place, "thread", "is called")),
+            FunctionKind::Secondary => {
+                return Err(self.refused(place, "sec", "runs beside the program"));
+            }
+        }
+        if self.frames.len() > MOST_CALLS {
+            let message = format!("calls are more than {MOST_CALLS} levels deep");
+            return Err(ScriptError::new(place, message));
+        }
+        let names: Vec<&str> = function
+            .parameters
+            .iter()
+            .map(|each| each.0.as_str())
+            .collect();
+        let values = self.bound(place, &shortened(&function.name), &names, arguments)?;
+        let mut locals: BTreeMap<&'p str, Value> = BTreeMap::new();
+        for ((name, otherwise), value) in function.parameters.iter().zip(values) {
+            let value = match (value, otherwise) {
+                (Some(value), _) => value,
+                (None, Some(otherwise)) => self.something(otherwise)?,
+                (None, None) => {
+                    let message = format!(
+                        "{}: `{}` is missing",
+                        shortened(&function.name),
+                        shortened(name)
+                    );
+                    return Err(ScriptError::new(place, message));
+                }
+            };
+            locals.insert(name, value);
+        }
+        self.frames.push(Frame {
+            function: Some(index),
+            locals: Some(locals),
+        });
+        let flow = self.statements(&function.body);
+        self.frames.pop();
+        Ok(match flow? {
+            Flow::Return(value) => Called::Value(value),
+            Flow::Halt => Called::Halt,
+            Flow::On | Flow::Break | Flow::Continue => Called::Value(Value::Nothing),
+        })
+    }
+}
+
+/// Elements of a list, those of lists in it included.
+fn elements(value: &Value) -> usize {
+    match value {
+        Value::List(all) => checked_size(all).unwrap_or(0),
+        _ => 0,
+    }
+}
+
+/// What came of a call.
+enum Called {
+    Value(Value),
+    /// The program ends.
+    Halt,
+}
+
+fn count(number: usize) -> String {
+    match number {
+        1 => "1 argument".to_owned(),
+        _ => format!("{number} arguments"),
+    }
+}
+
+/// An element of a list or a pose.
+fn element(of: &Value, index: usize) -> Result<Value, String> {
+    let (found, length) = match of {
+        Value::List(all) => (all.get(index).cloned(), all.len()),
+        Value::Pose(all) => (all.get(index).copied().map(Value::Number), all.len()),
+        other => return Err(format!("{} has no elements", other.kind())),
+    };
+    found.ok_or_else(|| format!("there is no element {index} of {length}: the first one is 0"))
+}
+
+/// Puts a value in the place of an element; with the number of elements that were copied for it.
+fn replace(of: &mut Value, indices: &[usize], value: Value) -> Result<usize, String> {
+    let [first, rest @ ..] = indices else {
+        *of = value;
+        return Ok(0);
+    };
+    let outside =
+        |length: usize| format!("there is no element {first} of {length}: the first one is 0");
+    match of {
+        Value::List(all) => {
+            let length = all.len();
+            let is_list = matches!(value, Value::List(_));
+            let copied = if Rc::strong_count(all) > 1 { length } else { 0 };
+            let all = Rc::make_mut(all);
+            let found = all.get_mut(*first).ok_or_else(|| outside(length))?;
+            let inside = replace(found, rest, value)?;
+            // What grew is looked at as a whole.
+            let size = if is_list { checked_size(all)? } else { 0 };
+            Ok(copied + inside + size)
+        }
+        Value::Pose(all) => {
+            let Value::Number(number) = value else {
+                return Err(format!(
+                    "{} in a pose, where a number is needed",
+                    value.kind()
+                ));
+            };
+            if !rest.is_empty() {
+                return Err("a number has no elements".to_owned());
+            }
+            let all = Rc::make_mut(all);
+            let length = all.len();
+            *all.get_mut(*first).ok_or_else(|| outside(length))? = number;
+            Ok(0)
+        }
+        other => Err(format!("{} has no elements", other.kind())),
+    }
+}

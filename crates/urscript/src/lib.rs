@@ -1,0 +1,24 @@
+//! Programs in URScript, the language of the controllers of UR arms.
+//!
+//! [`parse`] makes of a text a tree in which everything has its line and column. [`evaluate`] does what a program does
+//! whose course constants decide, and gives its motions to an [`Arm`]. No files, no clock, and no arm but that.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
+
+mod builtin;
+mod evaluate;
+mod functions;
+mod lexer;
+mod load;
+mod motion;
+mod operators;
+mod parser;
+mod place;
+pub mod tree;
+mod value;
+mod walk;
+
+pub use evaluate::{Installation, MOST_STEPS, Outcome, evaluate};
+pub use motion::{Arm, Belief, Motion, MotionKind, Pace};
+pub use parser::{MOST_BYTES, MOST_LEVELS, parse};
+pub use place::{Place, ScriptError};
+pub use value::Value;

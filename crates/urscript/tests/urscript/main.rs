@@ -1,0 +1,6 @@
+//! The crate from outside.
+
+mod evaluating;
+mod parsing;
+mod refusing;
+mod test_arm;
