@@ -14,7 +14,9 @@ use needlebench_cell::Robot;
 use needlebench_evaluation::report::Verdict;
 use needlebench_kinematics::ik::{DampedOptions, Numerical, wrap_angle};
 use needlebench_kinematics::{Joints, Pose};
-use needlebench_recorded::{Answer, AnswersFile, AnswersSource, Asked, Question};
+use needlebench_recorded::{
+    Answer, AnswersFile, AnswersSource, Asked, MotionOptions, Question, read_motion,
+};
 use needlebench_scenario::{Overrides, ResolvedScenario, Roll, load_scenario};
 
 fn scenario() -> ResolvedScenario {
@@ -39,7 +41,7 @@ fn descents(resolved: &ResolvedScenario, pose: &Pose) -> Vec<Joints> {
             seed,
             ..DampedOptions::default()
         };
-        let start = Joints::from_fn(|joint, _| (seed as f64 * (1.7 + joint as f64)).sin() * 3.0);
+        let start = Joints::from_fn(|joint, _| libm::sin(seed as f64 * (1.7 + joint as f64)) * 3.0);
         let end = solver.damped(pose, &start, &options);
         assert!(end.converged);
         let joints = end.joints.map(wrap_angle);
@@ -146,7 +148,8 @@ fn what_is_off_double_or_out_of_range_is_told_apart() {
         joints[5] += by;
         joints
     };
-    let turn = if all[0][5] > 0.0 { -1.0 } else { 1.0 } * std::f64::consts::TAU;
+    let by = if all[0][5] > 0.0 { -1 } else { 1 };
+    let turn = f64::from(by) * std::f64::consts::TAU;
     let cases = [
         all[0],
         all[0],
@@ -162,7 +165,7 @@ fn what_is_off_double_or_out_of_range_is_told_apart() {
     assert_eq!(answers[1].defects, [Defect::Double { of: 1 }]);
     assert_eq!(answers[2].defects, []);
     assert_eq!(answers[2].equivalent_to, Some(1));
-    assert_eq!(answers[2].turns.unwrap()[5], turn.signum() as i32);
+    assert_eq!(answers[2].turns.unwrap()[5], by);
     // Wrist 3 of the arm turns by one revolution either way.
     assert!(
         matches!(
@@ -227,7 +230,7 @@ fn a_motion_that_leads_nowhere_has_its_clearances_judged() {
     let resolved = scenario();
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../guide/examples/straight_line.yaml");
-    let motion = needlebench_recorded::read_motion(&path, &Default::default()).unwrap();
+    let motion = read_motion(&path, &MotionOptions::default()).unwrap();
     let report = judge_free(&resolved, &motion, None).unwrap();
     assert_eq!(report.verdict, Verdict::Fail);
     let failed: Vec<&str> = report

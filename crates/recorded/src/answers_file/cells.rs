@@ -33,7 +33,7 @@ const UNIT_WITHIN: f64 = 1e-4;
 /// Reads columns and rows.
 pub(super) struct Columns<'a> {
     file: &'a str,
-    columns: Vec<Column>,
+    meanings: Vec<Column>,
     names: Vec<String>,
     has_quaternion: bool,
     has_pose: bool,
@@ -95,7 +95,7 @@ impl<'a> Columns<'a> {
         }
         Ok(Self {
             file,
-            columns,
+            meanings: columns,
             names,
             has_quaternion,
             has_pose,
@@ -115,7 +115,7 @@ impl<'a> Columns<'a> {
         let mut joints = Joints::zeros();
         let mut pose = [0.0; POSE.len()];
         let mut asked = Asked::Goal;
-        for ((cell, column), name) in row.iter().zip(&self.columns).zip(&self.names) {
+        for ((cell, column), name) in row.iter().zip(&self.meanings).zip(&self.names) {
             let number = || match cell {
                 Cell::Number(number) => Ok(*number),
                 Cell::Text(text) => {

@@ -170,18 +170,14 @@ impl Made {
     /// The question that was asked, made if this is the first time.
     fn question(&mut self, asked: Asked, line: Option<usize>) -> &mut Question {
         let next = self.questions.len();
-        let index = match &asked {
-            Asked::BaseFromFlange(pose) => {
-                let place = pose.translation.vector;
-                let [x, y, z] = place.into();
-                let [i, j, k, w] = pose.rotation.coords.into();
-                let bits = [x, y, z, i, j, k, w].map(f64::to_bits);
-                *self.by_pose.entry(bits).or_insert(next)
-            }
-            _ => {
-                let known = self.questions.iter().position(|each| each.asked == asked);
-                known.unwrap_or(next)
-            }
+        let index = if let Asked::BaseFromFlange(pose) = &asked {
+            let [x, y, z] = pose.translation.vector.into();
+            let [i, j, k, w] = pose.rotation.coords.into();
+            let bits = [x, y, z, i, j, k, w].map(f64::to_bits);
+            *self.by_pose.entry(bits).or_insert(next)
+        } else {
+            let known = self.questions.iter().position(|each| each.asked == asked);
+            known.unwrap_or(next)
         };
         if index == next {
             self.questions.push(Question {
