@@ -17,7 +17,7 @@ pub(super) struct Knot {
 
 /// Joint positions over a path parameter `s`, `0 <= s <= length`: metres along a straight line of the
 /// tool ([`JointPath::line_ending_at`]), seconds at full speed through waypoints
-/// ([`JointPath::through`]), seconds through set-points ([`JointTrajectory::sampled`]).
+/// ([`JointPath::through`]), seconds through set-points ([`super::JointTrajectory::sampled`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointPath {
     knots: Vec<Knot>,

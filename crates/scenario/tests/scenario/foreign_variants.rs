@@ -304,7 +304,7 @@ fn vary(file: &mut File, draws: &mut Draws) {
     for name in JOINT_NAMES.into_iter().skip(draws.below(8)) {
         let joint = file.joint(name);
         "continuous".clone_into(&mut joint.kind);
-        joint.more = "<axis xyz=\"0 0 1\"/><limit velocity=\"3.1\" effort=\"28\"/>".to_owned();
+        "<axis xyz=\"0 0 1\"/><limit velocity=\"3.1\" effort=\"28\"/>".clone_into(&mut joint.more);
     }
     for name in JOINT_NAMES {
         let (_, body) = file
@@ -383,6 +383,9 @@ fn a_variant_has_the_forward_kinematics_of_its_written_origins() {
 }
 
 /// What a file lacks is said, with the joint and what to do.
+/// A change of a file.
+type Change<'a> = &'a dyn Fn(&mut File);
+
 #[test]
 fn what_a_variant_lacks_is_said() {
     let limit = |more: &'static str| {
@@ -397,7 +400,6 @@ fn what_a_variant_lacks_is_said() {
                 .to_owned();
         file.add(joint, "");
     };
-    type Change<'a> = &'a dyn Fn(&mut File);
     let cases: [(Change, &str, &str); 7] = [
         (
             &limit("<axis xyz=\"0 0 1\"/><limit lower=\"-3\" upper=\"3\" effort=\"28\"/>"),
