@@ -23,11 +23,11 @@ const JOINTS: [&str; 6] = [
 ];
 
 /// Numbers without an order, the same in every run (splitmix64).
-struct Draws(u64);
+pub struct Draws(pub u64);
 
 impl Draws {
     /// Between -1 and 1.
-    fn next(&mut self) -> f64 {
+    pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -35,14 +35,23 @@ impl Draws {
         f64::from(u32::try_from((z ^ (z >> 31)) >> 32).unwrap()) / f64::from(u32::MAX) * 2.0 - 1.0
     }
 
-    fn turn(&mut self) -> Matrix4<f64> {
+    /// A whole number below `end`.
+    pub fn below(&mut self, end: usize) -> usize {
+        let share = 0.5 * (self.next() + 1.0);
+        (0..end)
+            .rev()
+            .find(|k| share * end as f64 >= *k as f64)
+            .unwrap_or(0)
+    }
+
+    pub fn turn(&mut self) -> Matrix4<f64> {
         let [roll, pitch, yaw] = [self.next(), self.next(), self.next()];
         about_z(yaw * PI) * about_y(pitch * 0.5 * PI) * about_x(roll * PI)
     }
 }
 
 #[rustfmt::skip]
-fn about_x(angle: f64) -> Matrix4<f64> {
+pub fn about_x(angle: f64) -> Matrix4<f64> {
     let (s, c) = libm::sincos(angle);
     Matrix4::new(
         1.0, 0.0, 0.0, 0.0,
@@ -53,7 +62,7 @@ fn about_x(angle: f64) -> Matrix4<f64> {
 }
 
 #[rustfmt::skip]
-fn about_y(angle: f64) -> Matrix4<f64> {
+pub fn about_y(angle: f64) -> Matrix4<f64> {
     let (s, c) = libm::sincos(angle);
     Matrix4::new(
         c, 0.0, s, 0.0,
@@ -64,7 +73,7 @@ fn about_y(angle: f64) -> Matrix4<f64> {
 }
 
 #[rustfmt::skip]
-fn about_z(angle: f64) -> Matrix4<f64> {
+pub fn about_z(angle: f64) -> Matrix4<f64> {
     let (s, c) = libm::sincos(angle);
     Matrix4::new(
         c, -s, 0.0, 0.0,
@@ -74,12 +83,12 @@ fn about_z(angle: f64) -> Matrix4<f64> {
     )
 }
 
-fn along(x: f64, y: f64, z: f64) -> Matrix4<f64> {
+pub fn along(x: f64, y: f64, z: f64) -> Matrix4<f64> {
     Matrix4::new_translation(&Vector3::new(x, y, z))
 }
 
 /// The inverse of a rotation and a translation.
-fn back(pose: &Matrix4<f64>) -> Matrix4<f64> {
+pub fn back(pose: &Matrix4<f64>) -> Matrix4<f64> {
     let turn = pose.fixed_view::<3, 3>(0, 0).transpose();
     let moved = -(turn * pose.fixed_view::<3, 1>(0, 3));
     let mut inverse = Matrix4::identity();
@@ -89,7 +98,7 @@ fn back(pose: &Matrix4<f64>) -> Matrix4<f64> {
 }
 
 /// `<origin>` of a URDF: roll, pitch and yaw about the fixed axes.
-fn origin(pose: &Matrix4<f64>) -> String {
+pub fn origin(pose: &Matrix4<f64>) -> String {
     let m = |row: usize, column: usize| pose[(row, column)];
     let roll = libm::atan2(m(2, 1), m(2, 2));
     let pitch = libm::atan2(-m(2, 0), libm::sqrt(m(0, 0) * m(0, 0) + m(1, 0) * m(1, 0)));

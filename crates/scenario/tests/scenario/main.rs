@@ -7,6 +7,7 @@ mod calibration;
 mod family;
 mod foreign_chains;
 mod foreign_urdf;
+mod foreign_variants;
 mod goal_direction;
 mod layouts;
 mod limbs;
