@@ -3,9 +3,10 @@
 //! the written origins, multiplied here.
 
 use std::f64::consts::PI;
+use std::fmt::Write as _;
 use std::path::Path;
 
-use nalgebra::Matrix4;
+use nalgebra::{Matrix4, Vector3};
 use needlebench_input::Finding;
 use needlebench_kinematics::{JOINT_NAMES, Joints};
 use needlebench_robot::{Arm, LoadedRobot};
@@ -455,4 +456,61 @@ fn what_a_variant_lacks_is_said() {
         let note = "fixed at 0: finger_joint";
         assert!(notes.iter().any(|told| told.contains(note)), "{notes:?}");
     }
+}
+
+/// A six-joint arm with a spherical wrist, of no maker in particular.
+fn spherical_wrist(names: [&str; 6]) -> String {
+    let places: [(Vector3<f64>, Vector3<f64>); 6] = [
+        (Vector3::new(0.0, 0.0, 0.3), Vector3::z()),
+        (Vector3::new(0.1, 0.0, 0.15), Vector3::y()),
+        (Vector3::new(0.0, 0.0, 0.5), Vector3::y()),
+        (Vector3::new(0.2, 0.0, 0.04), Vector3::x()),
+        (Vector3::new(0.3, 0.0, 0.0), Vector3::y()),
+        (Vector3::new(0.08, 0.0, 0.0), Vector3::x()),
+    ];
+    let mut text = "<robot name=\"theirs\"><link name=\"base_link\"/>\n".to_owned();
+    let mut parent = "base_link".to_owned();
+    for (index, (name, (place, axis))) in names.into_iter().zip(places).enumerate() {
+        let child = format!("link_{}", index + 1);
+        writeln!(
+            text,
+            "<link name=\"{child}\"><inertial><mass value=\"3\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" \
+             iyz=\"0\" izz=\"0.01\"/></inertial></link><joint name=\"{name}\" type=\"revolute\">\
+             <parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"{} {} {}\" rpy=\"0 0 0\"/>\
+             <axis xyz=\"{} {} {}\"/><limit lower=\"-3\" upper=\"3\" effort=\"90\" velocity=\"3\"/></joint>",
+            place.x, place.y, place.z, axis.x, axis.y, axis.z
+        )
+        .unwrap();
+        parent = child;
+    }
+    text + "<link name=\"tool0\"/><joint name=\"flange\" type=\"fixed\"><parent link=\"link_6\"/><child link=\"tool0\"/>\
+            <origin rpy=\"0 1.5707963267948966 0\"/></joint></robot>\n"
+}
+
+#[test]
+fn the_six_joints_of_another_maker_are_refused() {
+    let own = [
+        "joint_1", "joint_2", "joint_3", "joint_4", "joint_5", "joint_6",
+    ];
+    let finding = load(&spherical_wrist(own)).unwrap_err();
+    assert!(
+        finding
+            .message
+            .contains("not a UR arm: its moving joints are joint_1, joint_2"),
+        "{finding}"
+    );
+    let hint = finding.hint.unwrap();
+    assert!(
+        hint.contains("the six-joint arms of Universal Robots"),
+        "{hint}"
+    );
+    // By the names alone it is none either.
+    let finding = load(&spherical_wrist(JOINT_NAMES)).unwrap_err();
+    assert!(
+        finding
+            .message
+            .contains("the joint origins are not those of a UR arm"),
+        "{finding}"
+    );
+    assert!(finding.hint.unwrap().contains("six-joint UR arms"));
 }
