@@ -153,7 +153,7 @@ def _on_client(
     return merge(path, [folder], out=out, page=page, progress=progress, **options)
 
 
-ROBOT_OPTIONS = ("arm", "robot", "prefix", "package_path", "calibration", "missing_inertia")
+ROBOT_OPTIONS = ("arm", "robot", "xacro", "prefix", "package_path", "calibration", "missing_inertia")
 """Options that affect the results."""
 
 

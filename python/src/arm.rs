@@ -51,6 +51,7 @@ pub(crate) fn overrides(
         .transpose()?;
     Ok(Overrides {
         robot_urdf: robot,
+        expanded: None,
         arm,
         prefix,
         packages,

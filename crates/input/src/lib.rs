@@ -26,7 +26,7 @@ pub use delimited::Separator;
 pub use file_kind::{FileKind, or_wrong_kind};
 pub use finding::{Finding, nearest_name, nothing_serves};
 pub use limit::{Limit, digits_apart};
-pub use location::{Location, ModelSource, PackagePaths, sha256_hex, source_of};
+pub use location::{Expanded, Location, ModelSource, PackagePaths, sha256_hex, source_of};
 pub use printable::{commented, printable, printable_json, printable_line};
 pub use read::{InputError, open_input, read_data, read_data_text, read_text};
 pub use toml_text::TomlText;

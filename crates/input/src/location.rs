@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
 
 use include_dir::{Dir, include_dir};
 use percent_encoding::percent_decode_str;
@@ -23,6 +24,19 @@ pub enum Location {
     Builtin(PathBuf),
     /// Path on disk.
     Disk(PathBuf),
+    /// What a program made of a file on disk.
+    Expanded(Arc<Expanded>),
+}
+
+/// Text that a program made of a file on disk; files beside it are those beside that file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Expanded {
+    /// The file on disk.
+    pub path: PathBuf,
+    /// What the program made of it.
+    pub text: Vec<u8>,
+    /// Program, arguments and digest, for the notes of a report.
+    pub note: String,
 }
 
 /// Search paths for `package://NAME/...`.
@@ -54,6 +68,21 @@ impl PackagePaths {
             paths.push((name.to_owned(), PathBuf::from(folder)));
         }
         Ok(Self(paths))
+    }
+
+    /// The packages, with another one unless one of its name is there.
+    #[must_use]
+    pub fn or(mut self, name: String, folder: PathBuf) -> Self {
+        if self.iter().all(|(known, _)| known != name) {
+            self.0.push((name, folder));
+        }
+        self
+    }
+
+    /// Names and folders.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Path)> {
+        let pairs = self.0.iter();
+        pairs.map(|(name, folder)| (name.as_str(), folder.as_path()))
     }
 }
 
@@ -109,6 +138,15 @@ impl Location {
         match self {
             Self::Builtin(path) => format!("{BUILTIN_PREFIX}{}", path.display()),
             Self::Disk(path) => path.display().to_string(),
+            Self::Expanded(made) => format!("{} (expanded)", made.path.display()),
+        }
+    }
+
+    /// How the text was made, where a program made it.
+    pub fn note(&self) -> Option<&str> {
+        match self {
+            Self::Builtin(_) | Self::Disk(_) => None,
+            Self::Expanded(made) => Some(&made.note),
         }
     }
 
@@ -125,6 +163,7 @@ impl Location {
                 bytes.ok_or_else(|| "no such shipped model".to_owned())
             }
             Self::Disk(path) => read_data(path).map_err(|error| error.to_string()),
+            Self::Expanded(made) => Ok(made.text.clone()),
         }
     }
 
@@ -133,6 +172,7 @@ impl Location {
         match self {
             Self::Builtin(path) => BUILTIN.get_file(path).is_some(),
             Self::Disk(path) => path.is_file(),
+            Self::Expanded(made) => made.path.is_file(),
         }
     }
 
@@ -152,7 +192,10 @@ impl Location {
 
     /// Name of the folder that the file is in; none in the working directory.
     pub fn folder_name(&self) -> Option<String> {
-        let (Self::Builtin(path) | Self::Disk(path)) = self;
+        let path = match self {
+            Self::Builtin(path) | Self::Disk(path) => path,
+            Self::Expanded(made) => &made.path,
+        };
         Some(path.parent()?.file_name()?.to_str()?.to_owned())
     }
 
@@ -162,6 +205,7 @@ impl Location {
         match self {
             Self::Builtin(path) => Self::Builtin(normalized(&sibling(path))),
             Self::Disk(path) => Self::Disk(sibling(path)),
+            Self::Expanded(made) => Self::Disk(sibling(&made.path)),
         }
     }
 

@@ -33,9 +33,13 @@ pub(crate) struct RobotArguments {
 /// A robot in place of the scenario's.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct UrdfArguments {
-    /// URDF of another UR arm, or a bundled arm's name [default: the scenario's robot, or a UR3].
+    /// URDF of another UR arm, a file.xacro that the program xacro on the PATH expands, or a bundled arm's name
+    /// [default: the scenario's robot, or a UR3].
     #[arg(long, value_name = "URDF")]
     pub robot: Option<PathBuf>,
+    /// Argument of xacro, such as ur_type:=ur10e, for a robot's file.xacro; repeatable.
+    #[arg(long, value_name = "NAME:=VALUE", requires = "robot")]
+    pub xacro: Vec<String>,
     /// Prefix of the arm's link and joint names, e.g. left_ in a URDF with two arms; joints of the other arms are fixed
     /// at 0.
     #[arg(long, value_name = "PREFIX")]
@@ -60,7 +64,7 @@ pub(crate) struct ArmArguments {
     #[arg(
         long,
         value_name = "MODEL",
-        conflicts_with_all = ["robot", "prefix", "package_path", "missing_inertia"]
+        conflicts_with_all = ["robot", "xacro", "prefix", "package_path", "missing_inertia"]
     )]
     pub arm: Option<UrModel>,
     #[command(flatten)]

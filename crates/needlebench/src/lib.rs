@@ -16,6 +16,7 @@ mod log;
 mod output;
 mod progress;
 mod renamed;
+mod xacro;
 
 pub use cli::{command_line, invoke, main, main_with};
 pub use command::KinematicArm;

@@ -10,6 +10,7 @@ mod arm_in_use;
 mod loaded;
 mod mesh_file;
 mod robot;
+mod ros_package;
 
 pub use arm::{Arm, Recognition};
 pub use arm_in_use::{ArmInUse, ArmReport};
@@ -22,3 +23,4 @@ pub use robot::{
     Calibration, DisabledPair, GuidePlace, LinkEnclosure, MOVING_LINK_LABELS, MissingInertia,
     OriginDeviation, Srdf, StatedShape, ToolOverrides, enclosures, read_robot, read_tool,
 };
+pub use ros_package::package_of;

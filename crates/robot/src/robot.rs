@@ -63,6 +63,7 @@ pub fn read_robot(
 ) -> Result<LoadedRobot, Finding> {
     let mut urdf = read_urdf(location)?;
     let mut notes = urdf.notes.clone();
+    notes.extend(location.note().map(str::to_owned));
     match prefix {
         Some(prefix) => {
             notes.push(take_prefix(&mut urdf, prefix)?);

@@ -82,6 +82,24 @@ class Shape:
             case _:
                 raise ValueError(f"no containment for {self.kind}")
 
+    def nearest(self, x: Array) -> Array | None:
+        """The point of the shape nearest to a point; `None` for meshes."""
+        match self.kind:
+            case "sphere" | "capsule":
+                core = np.array([0.0, 0.0, np.clip(x[2], -self.half_m[0], self.half_m[0])])
+                if self.kind == "sphere":
+                    core = np.zeros(3)
+                length = np.linalg.norm(x - core)
+                return x if length <= self.radius_m else core + (x - core) * (self.radius_m / length)
+            case "cylinder":
+                share = min(1.0, self.radius_m / max(np.hypot(x[0], x[1]), 1e-300))
+                z = np.clip(x[2], -self.half_m[0], self.half_m[0])
+                return np.array([share * x[0], share * x[1], z])
+            case "cuboid":
+                return np.clip(x, -self.half_m, self.half_m)
+            case _:
+                return None
+
 
 @dataclass(frozen=True)
 class Solid:

@@ -4,6 +4,8 @@
     python3 -m venv env && env/bin/pip install -r tests/validation/requirements.txt
     env/bin/python tests/validation/cell/compare.py --exporter target/release/cell_export
 
+Places the flange by Pinocchio at all solutions of inverse kinematics for a thousand postures of each scenario's arm.
+
 Builds every scenario's cell a second time (`cell.py`), asks Coal for the signed distance of every
 pair at the exporter's random postures, and fails where the two differ and needlebench cannot be
 proved right (`certificate.py`). Times both on the same postures. Writes `report.json` and
@@ -34,6 +36,14 @@ AGREEMENT_M = 1e-6
 OVERESTIMATE_M = 1e-9
 # Poses from two readers of the same files: sums and products of a dozen numbers below 3.
 PLACEMENT_M = 1e-12
+# A solution's flange from that of the posture whose pose was solved, m and rad: what `Kinematics::solve` states.
+SOLUTION = 1e-12
+# A posture is among the solutions of its own pose within this, rad, where no direction of the flange is slower than the
+# second number of that of the fastest.
+FOUND_RAD = 1e-9
+SINGULAR = 1e-3
+# The exporter solves so many postures' poses.
+SOLVED = 1000
 # Below this the sign of a distance is no statement, m.
 SIGN_M = 1e-8
 # Coal's tolerances: for the comparison; the timing has its defaults.
@@ -280,6 +290,47 @@ def judge(cell: Cell, answers: Answers) -> Tally:
     return tally
 
 
+def judge_solutions(cell: Cell, q: Array, file: Path) -> dict:
+    """Flange poses of inverse kinematics by Pinocchio, and whether each posture is among the solutions of its pose."""
+    rows = np.fromfile(file, dtype="<f8").reshape(-1, 7)
+    data, flange = cell.model.createData(), cell.model.getFrameId("tool0")
+
+    def placed(joints: Array) -> pin.SE3:
+        pin.framesForwardKinematics(cell.model, data, joints)
+        return data.oMf[flange].copy()
+
+    numbers = rows[:, 0].astype(int)
+    worst_m = worst_rad = 0.0
+    regular, lost = 0, []
+    postures = min(SOLVED, len(q))
+    for number in range(postures):
+        found = rows[numbers == number, 1:]
+        expected = placed(q[number])
+        for joints in found:
+            off = expected.actInv(placed(joints))
+            worst_m = max(worst_m, float(np.linalg.norm(off.translation)))
+            worst_rad = max(worst_rad, float(np.linalg.norm(pin.log3(off.rotation))))
+        jacobian = pin.computeFrameJacobian(cell.model, data, q[number], flange, pin.LOCAL_WORLD_ALIGNED)
+        speeds = np.linalg.svd(jacobian, compute_uv=False)
+        if speeds[-1] < SINGULAR * speeds[0]:
+            continue
+        regular += 1
+        turns = np.abs(np.remainder(found - q[number] + np.pi, 2.0 * np.pi) - np.pi).max(axis=1, initial=0.0)
+        if not len(found) or turns.min() > FOUND_RAD:
+            lost.append(number)
+    failures = [f"posture {number} is not among the solutions of its pose" for number in lost]
+    if not max(worst_m, worst_rad) <= SOLUTION:
+        failures.append(f"solutions of inverse kinematics are off by {worst_m} m and {worst_rad} rad")
+    return {
+        "postures": postures,
+        "solutions": len(rows),
+        "regular": regular,
+        "worst_m": worst_m,
+        "worst_rad": worst_rad,
+        "failures": failures,
+    }
+
+
 def quickest_s(call, arguments: list) -> float:
     """Mean time of a call over its arguments in the quickest pass."""
     best = float("inf")
@@ -384,6 +435,7 @@ def main() -> int:
             subprocess.run([*command, *count, *names], check=True, cwd=ROOT)
 
     tallies = []
+    solved = {}
     names = [path.stem for path in chosen]
     for name in [*names, *(f"{name}_surface" for name in names)]:
         header_file = out / f"{name}.json"
@@ -391,6 +443,8 @@ def main() -> int:
         answers = ask_both(cell, header_file.with_suffix(".f64"))
         tally = judge(cell, answers)
         tally.timing_s = time_posture(cell, answers.q)
+        solved[name] = judge_solutions(cell, answers.q, header_file.with_suffix(".ik.f64"))
+        tally.failures += solved[name]["failures"]
         tallies.append(tally)
     meshes, failures = compare_mesh(json.loads((out / "mesh.json").read_text()))
     failures += [f"{each.name}: {failure}" for each in tallies for failure in each.failures]
@@ -399,6 +453,7 @@ def main() -> int:
         "versions": {"coal": coal.__version__, "pinocchio": pin.__version__},
         "scenarios": tallies,
         "mesh": meshes,
+        "inverse_kinematics": solved,
         "failures": failures,
     }
     (out / "report.json").write_text(json.dumps(report, default=plain, indent=1) + "\n")
@@ -410,6 +465,9 @@ def main() -> int:
     print(f"figure postures {sum(each.postures for each in tallies)}")
     print(f"figure apart_nm {apart:.3g}\nfigure penetrating_nm {deep:.3g}")
     print(f"figure above_nm {max(each.largest_above_upper_bound.value for each in tallies) * 1e9:.3g}")
+    for word in ("m", "rad"):
+        print(f"figure solutions_{word} {max(each[f'worst_{word}'] for each in solved.values()):.2g}")
+    print(f"figure solutions {sum(each['solutions'] for each in solved.values())}")
     for failure in failures[:20]:
         print(f"error: {failure}", file=sys.stderr)
     if len(failures) > 20:

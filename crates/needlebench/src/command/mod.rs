@@ -31,6 +31,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use needlebench_engine::{ENGINES, engine_names};
 use needlebench_input::{Finding, PackagePaths};
+use needlebench_robot::package_of;
 use needlebench_scenario::{EntryChooser, Overrides, ResolvedScenario, load_scenario};
 use serde::Serialize;
 
@@ -65,6 +66,7 @@ use crate::arguments::{RobotArguments, UrdfArguments};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::output::{json_text, print_as_it_is, print_text};
+use crate::xacro::{expand, is_xacro};
 
 /// Reads a scenario, and rejects one that cannot be run.
 fn load(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
@@ -85,11 +87,30 @@ fn overrides(arguments: &RobotArguments) -> Result<Overrides, Finding> {
 }
 
 fn urdf_overrides(arguments: &UrdfArguments) -> Result<Overrides, Finding> {
+    let mut packages = PackagePaths::from_arguments(&arguments.package_path)?;
+    let expanded = match &arguments.robot {
+        // A file that is not there is told as any other is.
+        Some(file) if is_xacro(file) && file.is_file() => {
+            if let Some((name, folder)) = package_of(file) {
+                packages = packages.or(name, folder);
+            }
+            Some(Arc::new(expand(file, &arguments.xacro, &packages)?))
+        }
+        Some(file) if !arguments.xacro.is_empty() && !is_xacro(file) => {
+            let message = "it is for a robot whose file is one for xacro".to_owned();
+            return Err(Finding::new("--xacro", message).hint(format!(
+                "omit it, or give --robot a file.xacro instead of {}",
+                file.display()
+            )));
+        }
+        _ => None,
+    };
     Ok(Overrides {
         robot_urdf: arguments.robot.clone(),
+        expanded,
         arm: None,
         prefix: arguments.prefix.clone(),
-        packages: PackagePaths::from_arguments(&arguments.package_path)?,
+        packages,
         calibration: arguments.calibration.clone(),
         engines: engine_names(ENGINES),
         missing_inertia: arguments.missing_inertia.clone(),

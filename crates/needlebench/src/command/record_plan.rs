@@ -144,6 +144,15 @@ struct Made {
 
 fn plan(arguments: &RecordPlanArguments, overrides: &Overrides) -> Result<Made, Failure> {
     let wanted = wanted(arguments)?;
+    if let Some(expanded) = &overrides.expanded {
+        let file = expanded.path.display();
+        let message =
+            "the scenario that is written names its robot's URDF, and this is a xacro file";
+        return Err(vec![Finding::new(file.to_string(), message).hint(format!(
+            "expand it first: xacro {file} > robot.urdf; then --robot robot.urdf"
+        ))]
+        .into());
+    }
     let cell = cell_text(arguments, overrides)?;
     // The draft contains the overrides of the robot.
     let others = Overrides {

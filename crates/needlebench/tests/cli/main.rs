@@ -55,3 +55,5 @@ mod study;
 mod suggest;
 mod support;
 mod unjudged;
+#[cfg(unix)]
+mod xacro;

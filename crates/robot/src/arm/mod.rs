@@ -171,7 +171,7 @@ impl Arm {
     pub fn path(&self) -> String {
         match &self.location {
             Location::Builtin(path) => Path::new("models").join(path).display().to_string(),
-            Location::Disk(path) => path.display().to_string(),
+            Location::Disk(_) | Location::Expanded(_) => self.location.display(),
         }
     }
 
@@ -179,7 +179,7 @@ impl Arm {
     pub(crate) fn possessive(&self) -> String {
         match self.location {
             Location::Builtin(_) => format!("the shipped {}'s", self.data.name),
-            Location::Disk(_) => format!("the {}'s", self.data.name),
+            Location::Disk(_) | Location::Expanded(_) => format!("the {}'s", self.data.name),
         }
     }
 

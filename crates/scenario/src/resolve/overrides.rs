@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::entry::EntryChooser;
-use needlebench_input::{Finding, Location, PackagePaths};
+use needlebench_input::{Expanded, Finding, Location, PackagePaths};
 use needlebench_robot::MissingInertia;
 use needlebench_robot::arm::{Arm, DEFAULT_ARM, robot_location};
 
@@ -13,6 +13,8 @@ use needlebench_robot::arm::{Arm, DEFAULT_ARM, robot_location};
 pub struct Overrides {
     /// URDF of another robot, relative to the working directory, or the name of a shipped arm.
     pub robot_urdf: Option<PathBuf>,
+    /// What a program made of the file `robot_urdf`, which it replaces.
+    pub expanded: Option<Arc<Expanded>>,
     /// The arm whose data the robot has: the name of a shipped one, or the path of an `arm.toml`
     /// relative to the working directory. Without a URDF it is the robot too.
     pub arm: Option<String>,
@@ -35,7 +37,7 @@ pub struct Overrides {
 impl Overrides {
     /// Whether the scenario's robot is not used.
     pub(crate) fn replace_robot(&self) -> bool {
-        self.robot_urdf.is_some() || self.arm.is_some()
+        self.robot_urdf.is_some() || self.expanded.is_some() || self.arm.is_some()
     }
 
     /// The named arm, and where the URDF is: that arm's own or the default one's if none
@@ -47,6 +49,9 @@ impl Overrides {
             .as_ref()
             .map(|name| Arm::of_reference(name, here).map_err(|finding| finding.key("--arm")))
             .transpose()?;
+        if let Some(expanded) = &self.expanded {
+            return Ok((arm, Location::Expanded(Arc::clone(expanded))));
+        }
         let location = match (&self.robot_urdf, &arm) {
             (Some(path), _) => match path.to_str() {
                 Some(reference) => robot_location(reference, here),

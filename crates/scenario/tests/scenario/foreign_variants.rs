@@ -382,22 +382,21 @@ fn a_variant_has_the_forward_kinematics_of_its_written_origins() {
     println!("{files} files, worst deviation {worst:e}");
 }
 
-/// What a file lacks is said, with the joint and what to do.
-/// A change of a file.
+/// What is done to a file.
 type Change<'a> = &'a dyn Fn(&mut File);
 
+/// What a file lacks is said, with the joint and what to do.
 #[test]
 fn what_a_variant_lacks_is_said() {
     let limit = |more: &'static str| {
-        move |file: &mut File| file.joint("elbow_joint").more = more.to_owned()
+        move |file: &mut File| more.clone_into(&mut file.joint("elbow_joint").more)
     };
     let finger = |file: &mut File| {
         let mut joint = Joint::fixed("finger_joint", "tool0", "finger", &along(0.0, 0.0, 0.1));
         "prismatic".clone_into(&mut joint.kind);
-        joint.more =
-            "<axis xyz=\"0 1 0\"/><limit lower=\"0\" upper=\"0.04\" effort=\"9\" velocity=\"1\"/>\
-                      <mimic joint=\"other_finger\" multiplier=\"-1\"/>"
-                .to_owned();
+        "<axis xyz=\"0 1 0\"/><limit lower=\"0\" upper=\"0.04\" effort=\"9\" velocity=\"1\"/>\
+         <mimic joint=\"other_finger\" multiplier=\"-1\"/>"
+            .clone_into(&mut joint.more);
         file.add(joint, "");
     };
     let cases: [(Change, &str, &str); 7] = [

@@ -183,6 +183,9 @@ fn options(robot: &RobotArguments) -> Vec<String> {
     };
     add("arm", robot.arm.clone());
     add("robot", urdf.robot.as_ref().map(path));
+    for argument in &urdf.xacro {
+        add("xacro", Some(argument.clone()));
+    }
     add("prefix", urdf.prefix.clone());
     for package in &urdf.package_path {
         add("package-path", Some(package.clone()));

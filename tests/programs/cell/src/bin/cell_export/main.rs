@@ -8,7 +8,8 @@
 //! For every scenario `NAME.json` (bodies, shapes, pairs, timings) and `NAME.f64`: little-endian
 //! doubles, per posture six joint positions (rad) and then per pair of the cell
 //! [`NUMBERS_PER_PAIR`] numbers. Lengths in metres. The same arguments give the same bytes, but for
-//! the timings. Besides, `mesh.json`: single pairs against a triangle mesh that is not convex.
+//! the timings. `NAME.ik.f64`: all solutions of the flange's pose at the first [`SOLVED`] postures, each as the number of
+//! the posture and six joint positions. Besides, `mesh.json`: single pairs against a triangle mesh that is not convex.
 
 mod mesh_bench;
 
@@ -22,6 +23,7 @@ use std::time::Instant;
 use needlebench_cell::{BodyKind, Cell, Frame};
 use needlebench_clearance::ClearanceModel;
 use needlebench_geometry::{ConvexMesh, Shape, SolidMesh, TriangleMesh};
+use needlebench_kinematics::ik::Kinematics;
 use needlebench_kinematics::{Joints, Pose};
 use needlebench_numerics::random::SplitMix64;
 use needlebench_planning::Planner;
@@ -30,6 +32,9 @@ use serde_json::{Value, json};
 
 /// Per pair: distance, witness points on A and B, normal, indices of the two closest solids.
 const NUMBERS_PER_PAIR: usize = 12;
+
+/// Postures whose flange pose is solved.
+const SOLVED: usize = 1000;
 
 /// Half of the postures lie within this of the start posture or of one that serves a goal, rad:
 /// where clearances are small and matter, which most random postures do not reach.
@@ -145,7 +150,25 @@ fn export(
         header.to_string(),
     )?;
     std::fs::write(arguments.out.join(format!("{name}.f64")), bytes)?;
+    let solved = solutions(cell, &postures[..SOLVED.min(postures.len())])?;
+    std::fs::write(arguments.out.join(format!("{name}.ik.f64")), solved)?;
     Ok(())
+}
+
+/// What inverse kinematics makes of the flange's pose at postures.
+fn solutions(cell: &Cell, postures: &[Joints]) -> Result<Vec<u8>, Box<dyn Error>> {
+    let kinematics = Kinematics::new(cell.robot.chain)?;
+    let mut bytes = Vec::new();
+    for (number, q) in postures.iter().enumerate() {
+        let pose = kinematics.base_link_from_flange(q);
+        for solution in kinematics.solve(&pose, None).solutions {
+            bytes.extend_from_slice(&(number as f64).to_le_bytes());
+            for angle in &solution.joints {
+                bytes.extend_from_slice(&angle.to_le_bytes());
+            }
+        }
+    }
+    Ok(bytes)
 }
 
 /// Gives the phantom's skin as the same surface without its being known to be convex.
