@@ -2,6 +2,7 @@
 
 mod course;
 mod peaks;
+mod program;
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -30,6 +31,8 @@ use crate::setup::SetupError;
 
 use course::Course;
 use peaks::{is_kept, peaks};
+
+pub use program::{InstalledTcp, is_program, read_program};
 
 /// How a motion is judged.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
