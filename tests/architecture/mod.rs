@@ -109,6 +109,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "evaluation",
             "routing",
             "imaging",
+            "urscript",
             "recorded",
             "study",
             "uncertainty",

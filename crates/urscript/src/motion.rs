@@ -88,7 +88,7 @@ pub trait Arm {
     /// Pose of the flange in the controller's base frame.
     fn base_from_flange(&self, joints: &Joints) -> Pose;
     /// Joint positions that bring the flange to a pose in the controller's base frame: those nearest to a posture.
-    fn inverse(&self, base_from_flange: &Pose, near: &Joints) -> Option<Joints>;
+    fn inverse(&mut self, base_from_flange: &Pose, near: &Joints) -> Option<Joints>;
     /// Time between two set-points of the controller, s.
     fn period_s(&self) -> f64;
     /// Takes a motion that follows all before it.

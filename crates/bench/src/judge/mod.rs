@@ -4,6 +4,7 @@ pub mod answers;
 mod course;
 pub mod free;
 mod peaks;
+mod program;
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -32,6 +33,8 @@ use crate::setup::SetupError;
 
 use course::Course;
 use peaks::{peaks, results};
+
+pub use program::{InstalledTcp, is_program, read_program};
 
 /// How a motion is judged.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -1,18 +1,21 @@
 //! `needlebench judge`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use needlebench_bench::ct::{LastScan, scanned};
 use needlebench_bench::judge::answers::{AnswersOptions, TOLERANCE, judge_answers};
 use needlebench_bench::judge::free::judge_free;
-use needlebench_bench::judge::{JudgeError, JudgeOptions, judge as judge_motion};
+use needlebench_bench::judge::{
+    InstalledTcp, JudgeError, JudgeOptions, is_program, judge as judge_motion, read_program,
+};
 use needlebench_bench::progress::Silent;
 use needlebench_bench::{Control, RunOptions};
 use needlebench_evaluation::report::Verdict;
+use needlebench_input::Finding;
 use needlebench_kinematics::trajectory::Between;
-use needlebench_recorded::{MotionOptions, read_answers, read_motion};
+use needlebench_recorded::{MotionFile, MotionOptions, read_answers, read_motion};
 use needlebench_report::table::answers::answers_text;
 use needlebench_report::table::free::free_text;
 use needlebench_report::{answers_junit, free_junit, write_atomically};
@@ -35,6 +38,10 @@ for the time and one for each joint (what `export --as trajectory` writes in JSO
 UR's RTDE recorder or of ur_rtde (its set-points), or an MCAP file. Joints are found by name, in any order; angles are \
 in radians. Points without times get them from the limits of the scenario's [motion], with a stop at each.
 
+A program in URScript (.script) begins at the scenario's start posture. Its moves with fixed arguments are judged: \
+movej, movel, movep, servoj, with the controller's ramps and blends as assumed in the report's notes. What depends on \
+the arm's measured state, inputs, sockets or threads is refused with its line.
+
 The goal is the one at which the guide stands, within 20 mm and 5 degrees; the configuration the one of the eight whose \
 solution is nearest. Several holds of one motion are judged in their order. Judged are the criteria of a run, and \
 besides: guide_position, guide_angle, joint_range, joint_speed, joint_acceleration, joint_torque. Certified clearances \
@@ -47,6 +54,7 @@ Results of a motion to a goal in OUT/NAME of the scenario, as of a run.
 
 Example: needlebench judge scenarios/table3.toml --motion plan.json
 Example: needlebench judge cell.toml --motion moveit.yaml --goal lesion --start as-is --engine rapier
+Example: needlebench judge scenarios/table3.toml --motion guide/examples/to_the_needle.script
 Example: needlebench judge cell.toml --answers solver.csv --junit solver.xml";
 
 #[derive(Debug, Args)]
@@ -109,6 +117,9 @@ pub(crate) struct JudgeArguments {
     /// Topic of the joint states in an MCAP file.
     #[arg(long, value_name = "NAME", conflicts_with = "answers")]
     pub topic: Option<String>,
+    /// TCP of the controller's installation, for a program that sets none before it needs one.
+    #[arg(long, value_enum, value_name = "WHERE", conflicts_with = "answers")]
+    pub tcp: Option<TcpArgument>,
     /// Physics engines [default: those of the scenario].
     #[arg(long, value_name = "ENGINE[,ENGINE]", value_parser = EngineParser, conflicts_with = "answers")]
     pub engine: Option<EngineArgument>,
@@ -180,6 +191,54 @@ pub(crate) enum OfArgument {
     Actual,
 }
 
+/// Tool's point of an installation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TcpArgument {
+    /// Centre of the flange.
+    Flange,
+    /// Exit of the scenario's guide.
+    GuideExit,
+}
+
+/// Reads the motion: a program by its name, else points.
+fn read(
+    resolved: &ResolvedScenario,
+    path: &Path,
+    arguments: &JudgeArguments,
+) -> Result<MotionFile, Vec<Finding>> {
+    let refuse = |flag: &str, about: &str| {
+        let message = format!("{flag} is about {about}");
+        let finding = Finding::new(path.display().to_string(), message).key(flag);
+        Err(vec![finding.hint("leave it out")])
+    };
+    if !is_program(path) {
+        if arguments.tcp.is_some() {
+            return refuse("--tcp", "programs, and this is none");
+        }
+        let options = MotionOptions {
+            of_actual: arguments.of == OfArgument::Actual,
+            stretch: arguments.stretch.map(|number| number as usize),
+            topic: arguments.topic.clone(),
+        };
+        return read_motion(path, &options);
+    }
+    for (is_given, flag) in [
+        (arguments.of == OfArgument::Actual, "--of"),
+        (arguments.stretch.is_some(), "--stretch"),
+        (arguments.topic.is_some(), "--topic"),
+    ] {
+        if is_given {
+            return refuse(flag, "logs, and this is a program");
+        }
+    }
+    let installed = match arguments.tcp {
+        None => InstalledTcp::Unknown,
+        Some(TcpArgument::Flange) => InstalledTcp::Flange,
+        Some(TcpArgument::GuideExit) => InstalledTcp::GuideExit,
+    };
+    read_program(resolved, path, installed)
+}
+
 /// Judges a motion from a file.
 pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
     if arguments.wide {
@@ -192,14 +251,7 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
     let Some(motion) = &arguments.motion else {
         return answers(arguments, &resolved);
     };
-    let motion = read_motion(
-        motion,
-        &MotionOptions {
-            of_actual: arguments.of == OfArgument::Actual,
-            stretch: arguments.stretch.map(|number| number as usize),
-            topic: arguments.topic.clone(),
-        },
-    )?;
+    let motion = read(&resolved, motion, arguments)?;
     let between = arguments.between.map(|between| match between {
         BetweenArgument::Quintics => Between::Quintics,
         BetweenArgument::Cubics => Between::Cubics,

@@ -9,7 +9,11 @@ use crate::support::{Bench, Json, workspace};
 /// A folder with the paper's scenario and a motion of straight joint-space lines.
 fn bench() -> Bench {
     let bench = Bench::new();
-    for path in ["scenarios/table3.toml", "guide/examples/straight_line.yaml"] {
+    for path in [
+        "scenarios/table3.toml",
+        "guide/examples/straight_line.yaml",
+        "guide/examples/to_the_needle.script",
+    ] {
         let name = Path::new(path)
             .file_name()
             .unwrap()
@@ -93,15 +97,115 @@ fn a_corner_fails_by_name_and_every_result_is_written() {
 }
 
 #[test]
+fn an_exported_program_is_judged_as_the_plan_was() {
+    let bench = bench();
+    let run: Value = bench
+        .run(format!("run table3.toml --out ran {QUIET}"))
+        .exits_with(0)
+        .json();
+    let label = run["goals"][0]["recommended"]["label"].word().to_owned();
+    let mut all = run["goals"][0]["configurations"].list().iter();
+    let planned = all.find(|each| each["label"] == label.as_str()).unwrap();
+    bench
+        .run("export table3.toml --as urscript --out program.script")
+        .exits_with(0);
+    let answer: Value = bench
+        .run(format!("judge table3.toml --motion program.script {QUIET}"))
+        .json();
+    assert_eq!(answer["judged"]["format"], "URScript program");
+    let judged = &answer["goals"][0]["configurations"][0];
+    assert_eq!(judged["label"], label.as_str());
+    // The posture is the same to the digits of the program, and so is what is measured there.
+    for key in ["clearance", "tip_rms", "corridor_clearance"] {
+        let [known, found] = [planned, judged].map(|each| each["metrics"][key].as_f64());
+        if let (Some(known), Some(found)) = (known, found) {
+            assert!((known - found).abs() < 1e-3, "{key} {known} {found}");
+        }
+    }
+    assert!(
+        answer["judged"]["holds"][0]["guide_off_m"]
+            .as_f64()
+            .unwrap()
+            < 1e-6
+    );
+}
+
+#[test]
+fn a_program_is_judged_with_what_it_makes_its_controller_believe() {
+    let bench = bench();
+    let good = "judge table3.toml --motion to_the_needle.script --no-page --engine rapier --no-pictures --quiet --wide";
+    let answer = bench.run(good);
+    let words: Vec<&str> = answer.stdout.split_whitespace().collect();
+    let text = words.join(" ");
+    for said in [
+        "URScript program",
+        "Right-Up-Fold, joints within 0.000 deg of its solution",
+        "assumed: moves accelerate with a ramp of 0.14 s",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    assert!(!text.contains("payload"));
+    let program = bench.text("to_the_needle.script");
+    let believing = program
+        .replace("set_payload(0.2434", "set_payload(0.0")
+        .replace("set_tcp(p[0.07,", "set_tcp(p[0.08,");
+    bench.write("believing.script", believing);
+    let answer = bench.run(good.replace("to_the_needle", "believing"));
+    let words: Vec<&str> = answer.stdout.split_whitespace().collect();
+    let text = words.join(" ");
+    for said in [
+        "payload 0.000 kg set, 0.243 kg carried",
+        "TCP 10.0 mm and 0.0 deg off the guide's exit",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+}
+
+#[test]
 fn what_is_no_motion_of_this_scenario_is_refused() {
     let bench = bench();
-    bench.write("moved.script", "movej([0,0,0,0,0,0])\n");
+    bench.write("program.urp", "x");
+    bench.write("poses.script", "\nmovel(p[0.2, 0, 0.3, 0, 3, 0])\n");
+    bench.write(
+        "measured.script",
+        "movej([0,0,0,0,0,0])\nif force() > 3:\nhalt\nend\n",
+    );
+    bench.write("still.script", "sleep(0)\n");
+    bench.write("wrong.script", "def f():\n  movej([0, 1\nend\n");
     bench.write("deg.csv", "t,shoulder_pan_deg\n0,0\n");
     for (arguments, said) in [
         ("--motion nothing.json", "cannot read the motion"),
         (
-            "--motion moved.script",
-            "a motion is not read from a program (.script)",
+            "--motion program.urp",
+            "a motion is not read from a program (.urp)",
+        ),
+        (
+            "--motion program.urp",
+            "judge the .script that PolyScope saves",
+        ),
+        ("--motion nothing.script", "cannot read the program"),
+        (
+            "--motion poses.script",
+            "column 1: the program sets no TCP before this",
+        ),
+        ("--motion poses.script --tcp flange", "at no goal"),
+        (
+            "--motion measured.script",
+            "column 4: `force` reads the arm's measured state",
+        ),
+        ("--motion measured.script", "measured.script:2:4"),
+        ("--motion still.script", "the program moves nothing"),
+        (
+            "--motion wrong.script",
+            "column 1: `,` between elements is missing before `end`",
+        ),
+        (
+            "--motion to_the_needle.script --of actual",
+            "--of is about logs, and this is a program",
+        ),
+        (
+            "--motion straight_line.yaml --tcp flange",
+            "--tcp is about programs, and this is none",
         ),
         ("--motion deg.csv", "is in degrees"),
         (

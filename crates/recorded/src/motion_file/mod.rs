@@ -97,7 +97,11 @@ pub fn read_motion(path: &Path, options: &MotionOptions) -> Result<MotionFile, V
     let extension = path.extension().and_then(|extension| extension.to_str());
     if let Some(kind @ ("script" | "urp" | "urscript")) = extension {
         let message = format!("a motion is not read from a program (.{kind})");
-        let hint = "run the program in the controller's simulator, and judge its RTDE log: target_q is judged";
+        let hint = if kind == "urp" {
+            "judge the .script that PolyScope saves beside it, or an RTDE log of the controller's simulator"
+        } else {
+            "run the program in the controller's simulator, and judge its RTDE log: target_q is judged"
+        };
         return Err(vec![Finding::new(&file, message).hint(hint)]);
     }
     let text = read_data_text(path).map_err(|error| {

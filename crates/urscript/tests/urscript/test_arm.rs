@@ -35,7 +35,7 @@ impl Arm for TestArm {
         base_from_base_link() * self.kinematics.base_link_from_flange(joints)
     }
 
-    fn inverse(&self, base_from_flange: &Pose, near: &Joints) -> Option<Joints> {
+    fn inverse(&mut self, base_from_flange: &Pose, near: &Joints) -> Option<Joints> {
         let pose = base_from_base_link() * base_from_flange;
         let all = self.kinematics.branches(&pose, Some(near)).solutions;
         let off = |joints: &Joints| (joints - near).amax();
@@ -52,7 +52,7 @@ impl Arm for TestArm {
             MotionKind::Joints { to, .. } | MotionKind::Servo { to, .. } => self.joints = *to,
             MotionKind::Line { to, .. } | MotionKind::Process { to, .. } => {
                 let flange = to * motion.flange_from_tcp.unwrap().inverse();
-                let found = self.inverse(&flange, &self.joints);
+                let found = self.inverse(&flange, &{ self.joints });
                 self.joints =
                     found.ok_or_else(|| ScriptError::new(motion.place, "out of reach"))?;
             }
