@@ -20,7 +20,7 @@ def table3() -> nb.Scenario:
 
 
 def straight(table3: nb.Scenario, until: float = 1.0) -> tuple[Any, Any]:
-    """A straight line of the joints to a configuration that works, and a stop."""
+    """A straight line of the joints to a feasible configuration, and a stop."""
     end = table3.plan()["pose"]["Right-Up-Fold"].joints_rad
     assert end is not None
     part = np.append(np.linspace(0.0, until, 41), until)

@@ -239,6 +239,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "evaluation",
             "engine",
             "planning",
+            "recorded",
             "clearance",
             "scenario",
             "cell",
@@ -282,7 +283,8 @@ const OWNERS: [(&str, &[&str]); 21] = [
     ("roxmltree", &["robot"]),
     ("granit-parser", &["input"]),
     ("stl_io", &["geometry"]),
-    ("parquet", &["study"]),
+    // Tables of studies, and of answers of other solvers.
+    ("parquet", &["recorded", "study"]),
     ("zstd", &["study"]),
     ("crc32fast", &["study"]),
     ("mcap", &["ros"]),

@@ -149,7 +149,7 @@ pub enum Defect {
 /// A posture in the cell, which decides nothing of whether an answer is right.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PostureReport {
-    /// The first rule or criterion that it does not keep; none of one that works.
+    /// The first rule or criterion that it does not keep; none of a feasible one.
     pub fault: Option<String>,
     /// Least clearances, m, by class.
     pub clearance_m: BTreeMap<&'static str, f64>,
@@ -469,7 +469,7 @@ impl AnswersJudge<'_> {
         }
     }
 
-    /// The configurations that reach a goal at any roll: at that of a right answer, else where the posture works, else
+    /// The configurations that reach a goal at any roll: at that of a right answer, else where the posture is feasible, else
     /// anywhere.
     fn at_any_roll(&self, goal: &Goal, placed: &[Placed]) -> Vec<SolutionReport> {
         let right = placed.iter().filter(|each| each.report.defects.is_empty());

@@ -109,7 +109,7 @@ fn solutions(question: &QuestionReport) -> Block {
             by,
             roll(*roll_rad),
             clearance(posture),
-            works(posture),
+            feasible(posture),
         ]
     });
     Block::table(
@@ -216,6 +216,6 @@ fn clearance(posture: &PostureReport) -> String {
     least_m.map_or("-".to_owned(), |least_m| format!("{:.1}", least_m * 1e3))
 }
 
-fn works(posture: &PostureReport) -> String {
-    posture.fault.clone().unwrap_or_else(|| "works".to_owned())
+fn feasible(posture: &PostureReport) -> String {
+    posture.fault.clone().unwrap_or_else(|| "feasible".to_owned())
 }
