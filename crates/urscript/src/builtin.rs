@@ -155,7 +155,7 @@ const fn evaluated(
 }
 
 /// What is evaluated, by name.
-static EVALUATED: [Builtin; 61] = [
+static EVALUATED: [Builtin; 62] = [
     evaluated("acos", 1, &["f"], math::acos),
     evaluated("asin", 1, &["f"], math::asin),
     evaluated("atan", 1, &["f"], math::atan),
@@ -227,6 +227,12 @@ static EVALUATED: [Builtin; 61] = [
     ),
     evaluated("length", 1, &["v"], texts::length),
     evaluated("log", 2, &["b", "f"], math::log),
+    evaluated(
+        "movec",
+        2,
+        &["pose_via", "pose_to", "a", "v", "r", "mode"],
+        arm::movec,
+    ),
     evaluated("movej", 1, &["q", "a", "v", "t", "r"], arm::movej),
     evaluated("movel", 1, &["pose", "a", "v", "t", "r"], arm::movel),
     evaluated("movep", 1, &["pose", "a", "v", "r"], arm::movep),
@@ -490,13 +496,7 @@ static REFUSED: [(Reason, &[&str]); 12] = [
     ),
     (
         Reason::Planned,
-        &[
-            "movec",
-            "optimovej",
-            "optimovel",
-            "pause_on_error_code",
-            "servoc",
-        ],
+        &["optimovej", "optimovel", "pause_on_error_code", "servoc"],
     ),
     (Reason::Chance, &["random"]),
     (Reason::Clock, &["time", "get_robot_uptime"]),

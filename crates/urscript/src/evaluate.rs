@@ -16,7 +16,7 @@ use crate::tree::{
 };
 use crate::value::{Value, checked_size, list};
 
-/// Most steps of a program: an hour of set-points every 2 ms takes fewer.
+/// Most steps of a program: a loop that streams 100 000 joint positions takes fewer.
 pub const MOST_STEPS: u64 = 5_000_000;
 
 /// Most functions that wait for each other's return.
@@ -29,6 +29,10 @@ const MOST_DEPTH: usize = 1000;
 const MOST_NOTES: usize = 50;
 const MOST_COUNTED: usize = 100;
 const MOST_LINES: usize = 5;
+
+/// What a loop without end is told.
+const NEVER_ENDS: &str = "does a loop never end, as with `Program Loops Forever` of PolyScope? save the program \
+                          without it: only programs that end are judged";
 
 /// Steps that a call of a built-in function counts for.
 const CALL_STEPS: usize = 20;
@@ -219,6 +223,7 @@ impl<'p> Evaluator<'p, '_> {
         self.is_blended = match motion.kind {
             MotionKind::Joints { blend_m, .. }
             | MotionKind::Line { blend_m, .. }
+            | MotionKind::Circle { blend_m, .. }
             | MotionKind::Process { blend_m, .. } => blend_m > 0.0,
             _ => false,
         };
@@ -231,8 +236,7 @@ impl<'p> Evaluator<'p, '_> {
             return Ok(());
         }
         let message = format!("the program takes more than {MOST_STEPS} steps");
-        Err(ScriptError::new(place, message)
-            .hint("does a loop never end? only programs that end are judged"))
+        Err(ScriptError::new(place, message).hint(NEVER_ENDS))
     }
 
     fn deeper<T>(

@@ -1,5 +1,6 @@
 //! What a program wants of the arm.
 
+use nalgebra::Vector3;
 use needlebench_kinematics::{Joints, Pose};
 
 use crate::place::{Place, ScriptError};
@@ -32,6 +33,17 @@ pub enum MotionKind {
         /// Where to.
         to: Pose,
         /// Acceleration and speed of the tool's point, or a time.
+        pace: Pace,
+        /// As of [`MotionKind::Joints`].
+        blend_m: f64,
+    },
+    /// `movec`: the tool's point along a circle, the tool turning evenly about one axis.
+    Circle {
+        /// A place between begin and end.
+        via_m: Vector3<f64>,
+        /// Where to.
+        to: Pose,
+        /// Acceleration and speed of the tool's point.
         pace: Pace,
         /// As of [`MotionKind::Joints`].
         blend_m: f64,

@@ -39,8 +39,8 @@ UR's RTDE recorder or of ur_rtde (its set-points), or an MCAP file. Joints are f
 in radians. Points without times get them from the limits of the scenario's [motion], with a stop at each.
 
 A program in URScript (.script) begins at the scenario's start posture. Its moves with fixed arguments are judged: \
-movej, movel, movep, servoj, with the controller's ramps and blends as assumed in the report's notes. What depends on \
-the arm's measured state, inputs, sockets or threads is refused with its line.
+movej, movel, movep, movec, servoj, with the controller's ramps and blends as assumed in the report's notes. What \
+depends on the arm's measured state, inputs, sockets or threads is refused with its line.
 
 The goal is the one at which the guide stands, within 20 mm and 5 degrees; the configuration the one of the eight whose \
 solution is nearest. Several holds of one motion are judged in their order. Judged are the criteria of a run, and \

@@ -187,12 +187,13 @@ fn joint_target(evaluator: &mut Evaluator<'_, '_>, call: &Call) -> Result<Joints
 fn tool_target(
     evaluator: &mut Evaluator<'_, '_>,
     call: &Call,
+    index: usize,
     tcp: &Pose,
 ) -> Result<Pose, ScriptError> {
-    if let Value::Pose(_) = call.value(0)? {
-        return call.pose(0);
+    if let Value::Pose(_) = call.value(index)? {
+        return call.pose(index);
     }
-    let joints = call.joints(0)?;
+    let joints = call.joints(index)?;
     Ok(evaluator.arm.base_from_flange(&joints) * tcp)
 }
 
@@ -229,7 +230,7 @@ pub(crate) fn movej(evaluator: &mut Evaluator<'_, '_>, call: &Call) -> Done {
 
 pub(crate) fn movel(evaluator: &mut Evaluator<'_, '_>, call: &Call) -> Done {
     let tcp = evaluator.tcp(call.place)?;
-    let to = tool_target(evaluator, call, &tcp)?;
+    let to = tool_target(evaluator, call, 0, &tcp)?;
     let pace = pace(call, TOOL_PACE, Some(3))?;
     let blend_m = bounded(call, 4, 0.0, Least::Zero)?;
     perform(
@@ -242,7 +243,7 @@ pub(crate) fn movel(evaluator: &mut Evaluator<'_, '_>, call: &Call) -> Done {
 
 pub(crate) fn movep(evaluator: &mut Evaluator<'_, '_>, call: &Call) -> Done {
     let tcp = evaluator.tcp(call.place)?;
-    let to = tool_target(evaluator, call, &tcp)?;
+    let to = tool_target(evaluator, call, 0, &tcp)?;
     let pace = pace(call, TOOL_PACE, None)?;
     let blend_m = call.number_or(3, 0.0)?;
     if blend_m < 0.0 {
@@ -254,6 +255,41 @@ pub(crate) fn movep(evaluator: &mut Evaluator<'_, '_>, call: &Call) -> Done {
         MotionKind::Process { to, pace, blend_m },
         Some(tcp),
     )
+}
+
+/// Mode 0: the tool turns evenly to its end, whatever it has at the place between.
+pub(crate) fn movec(evaluator: &mut Evaluator<'_, '_>, call: &Call) -> Done {
+    let tcp = evaluator.tcp(call.place)?;
+    let via_m = tool_target(evaluator, call, 0, &tcp)?.translation.vector;
+    let to = tool_target(evaluator, call, 1, &tcp)?;
+    let [acceleration, speed] =
+        [(2, "a", TOOL_PACE[0]), (3, "v", TOOL_PACE[1])].map(|(index, name, otherwise)| {
+            let number = call.number_or(index, otherwise)?;
+            if number > 0.0 {
+                return Ok(number);
+            }
+            Err(call.error(format!("{name} is {number}, and has to be more than 0")))
+        });
+    let pace = Pace {
+        acceleration: acceleration?,
+        speed: speed?,
+        time_s: None,
+    };
+    let blend_m = call.number_or(4, 0.0)?;
+    if blend_m < 0.0 {
+        return Err(call.error(format!("r is {blend_m}, and has to be at least 0")));
+    }
+    if call.number_or(5, 0.0)? != 0.0 {
+        let reason = "turns the tool with the circle in that mode, which is not simulated";
+        return Err(evaluator.refused(call.place, call.name, reason));
+    }
+    let kind = MotionKind::Circle {
+        via_m,
+        to,
+        pace,
+        blend_m,
+    };
+    perform(evaluator, call, kind, Some(tcp))
 }
 
 /// Acceleration and speed of `servoj` do not count.

@@ -182,6 +182,31 @@ fn moves_have_the_manuals_defaults_and_take_joints_or_poses() {
     assert_eq!(lines, [2, 3, 5, 6, 7, 8, 9, 10, 11]);
 }
 
+#[test]
+fn circles_go_through_a_place_with_the_manuals_defaults() {
+    let text = "set_tcp(p[0, 0, 0.1, 0, 0, 0])\nhere = get_target_tcp_pose()\n\
+                via = pose_add(here, p[0.02, 0.02, 0, 0, 0, 0])\n\
+                movec(via, pose_add(here, p[0.04, 0, 0, 0, 0, 0]), r = 0.01)";
+    let all = motions(text);
+    let tcp = Pose::translation(0.0, 0.0, 0.1);
+    let here = TestArm::new().base_from_flange(&start()) * tcp;
+    match &all[0].kind {
+        MotionKind::Circle {
+            via_m,
+            to,
+            pace,
+            blend_m,
+        } => {
+            let off = via_m - here.translation.vector;
+            assert!((off - nalgebra::Vector3::new(0.02, 0.02, 0.0)).amax() < ROUNDING);
+            let off = to.translation.vector - here.translation.vector;
+            assert!((off - nalgebra::Vector3::new(0.04, 0.0, 0.0)).amax() < ROUNDING);
+            assert_eq!((pace.acceleration, pace.speed, *blend_m), (1.2, 0.25, 0.01));
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
 /// The pose that a program's expression is worth.
 fn pose(expression: &str) -> Pose {
     let zero = "[0, 0, 0, 0, 0, 0]";

@@ -47,12 +47,7 @@ fn what_depends_on_more_than_constants_is_refused_with_its_place() {
             "until something stops it",
         ),
         ("x = random()", 1, 5, "random"),
-        (
-            "movec(p[0,0,0,0,0,0], p[0,0,0,0,0,0])",
-            1,
-            1,
-            "only the controller knows",
-        ),
+        ("servoc(p[0,0,0,0,0,0])", 1, 1, "only the controller knows"),
         (
             "x = request_boolean_from_primary_client(\"a\")",
             1,
@@ -68,6 +63,12 @@ fn what_depends_on_more_than_constants_is_refused_with_its_place() {
             "conveyor",
         ),
         ("join 3", 1, 1, "waits for a thread"),
+        (
+            "set_tcp(p[0,0,0,0,0,0])\nmovec(p[0,0,0,0,0,0], p[0,0,1,0,0,0], mode = 1)",
+            2,
+            1,
+            "in that mode",
+        ),
     ] {
         let error = done(text).expect_err(text);
         assert_eq!(

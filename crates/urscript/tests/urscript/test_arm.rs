@@ -50,7 +50,9 @@ impl Arm for TestArm {
     fn perform(&mut self, motion: &Motion) -> Result<(), ScriptError> {
         match &motion.kind {
             MotionKind::Joints { to, .. } | MotionKind::Servo { to, .. } => self.joints = *to,
-            MotionKind::Line { to, .. } | MotionKind::Process { to, .. } => {
+            MotionKind::Line { to, .. }
+            | MotionKind::Circle { to, .. }
+            | MotionKind::Process { to, .. } => {
                 let flange = to * motion.flange_from_tcp.unwrap().inverse();
                 let found = self.inverse(&flange, &{ self.joints });
                 self.joints =

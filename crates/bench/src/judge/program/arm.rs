@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use nalgebra::Vector3;
 use needlebench_kinematics::ik::{Kinematics, nearest_within_limits};
 use needlebench_kinematics::trajectory::JointState;
 use needlebench_kinematics::{JOINT_NAMES, JointLimits, Joints, Pose, base_from_base_link};
@@ -247,7 +248,7 @@ impl ProgramArm {
     fn line(
         &mut self,
         motion: &Motion,
-        to: &Pose,
+        (to, via_m): (&Pose, Option<&Vector3<f64>>),
         pace: &Pace,
         blend_m: f64,
     ) -> Result<(), ScriptError> {
@@ -263,10 +264,13 @@ impl ProgramArm {
             start,
             &flange_from_tcp,
             &base_link_from_end,
+            via_m
+                .map(|via_m| base_from_base_link().rotation * via_m)
+                .as_ref(),
             pace,
         );
         let leg = leg.map_err(|error| no_line(motion.place, error))?;
-        if leg.is_some() && way.norm() < super::leg::NO_TRANSLATION_M {
+        if leg.is_some() && via_m.is_none() && way.norm() < super::leg::NO_TRANSLATION_M {
             self.assumed.insert(Assumed::Turning);
         }
         self.append(motion, leg, blend_m)
@@ -311,6 +315,10 @@ fn no_line(place: Place, error: NoLine) -> ScriptError {
             ScriptError::new(place, message)
                 .hint("use movej, or begin the line in another configuration")
         }
+        NoLine::NoCircle => {
+            let message = "begin, pose_via and pose_to of the circle lie on a line";
+            ScriptError::new(place, message).hint("use movel")
+        }
         NoLine::Pace => ScriptError::new(place, "a, v or t of the move give no course"),
     }
 }
@@ -350,11 +358,17 @@ impl Arm for ProgramArm {
                 let leg = leg.map_err(|error| no_line(motion.place, error))?;
                 self.append(motion, leg, *blend_m)
             }
-            MotionKind::Line { to, pace, blend_m } => self.line(motion, to, pace, *blend_m),
+            MotionKind::Line { to, pace, blend_m } => self.line(motion, (to, None), pace, *blend_m),
             MotionKind::Process { to, pace, blend_m } => {
                 self.assumed.insert(Assumed::Process);
-                self.line(motion, to, pace, *blend_m)
+                self.line(motion, (to, None), pace, *blend_m)
             }
+            MotionKind::Circle {
+                via_m,
+                to,
+                pace,
+                blend_m,
+            } => self.line(motion, (to, Some(via_m)), pace, *blend_m),
             MotionKind::Servo { to, time_s, .. } => {
                 self.finish_chain()?;
                 check_posture(motion.place, to)?;

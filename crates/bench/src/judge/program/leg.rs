@@ -55,6 +55,8 @@ pub(super) enum NoLine {
     OutOfReach(f64),
     /// The joints would have to jump to another branch there, or pass a singularity.
     Jump(f64),
+    /// Begin, place between and end lie on no circle.
+    NoCircle,
     /// Acceleration, speed or time are too large or too small for a course.
     Pace,
 }
@@ -79,7 +81,8 @@ impl Leg {
         }))
     }
 
-    /// The tool's point along a straight line, the tool turning evenly about one axis; none where nothing moves.
+    /// The tool's point along a straight line, or along the circle through a place (in `base_link`), the tool turning
+    /// evenly about one axis; none where nothing moves.
     ///
     /// # Errors
     /// [`NoLine`].
@@ -88,9 +91,15 @@ impl Leg {
         start: Joints,
         flange_from_tcp: &Pose,
         base_link_from_end: &Pose,
+        via_m: Option<&Vector3<f64>>,
         pace: &Pace,
     ) -> Result<Option<Self>, NoLine> {
-        let line = ToolLine::new(kinematics, &start, flange_from_tcp, base_link_from_end);
+        let mut line = ToolLine::new(kinematics, &start, flange_from_tcp, base_link_from_end);
+        if let Some(via_m) = via_m {
+            let start_m = line.base_link_from_start.translation.vector;
+            let end_m = base_link_from_end.translation.vector;
+            line.circle = Some(Circle::through(&start_m, via_m, &end_m).ok_or(NoLine::NoCircle)?);
+        }
         let length = line.length();
         if length < NO_WAY {
             return Ok(None);
@@ -177,7 +186,58 @@ fn profile(length: f64, pace: &Pace) -> Result<DoubleS, NoLine> {
     }
 }
 
-/// The tool's point along a straight line.
+/// A circle's arc: `centre + u cos(angle share) + w sin(angle share)`.
+#[derive(Debug)]
+struct Circle {
+    centre_m: Vector3<f64>,
+    u_m: Vector3<f64>,
+    w_m: Vector3<f64>,
+    angle_rad: f64,
+}
+
+impl Circle {
+    /// The arc from one place through another to a third; none where they lie on a line.
+    fn through(start: &Vector3<f64>, via: &Vector3<f64>, end: &Vector3<f64>) -> Option<Self> {
+        // The centre of the circle about a triangle, from one of its corners.
+        let (a, b) = (via - start, end - start);
+        let normal = a.cross(&b);
+        let doubled = normal.norm_squared();
+        let sine = normal.norm() / (a.norm() * b.norm());
+        if sine.is_nan() || sine < LEAST_SINE {
+            return None;
+        }
+        let to_centre =
+            (b * a.norm_squared() - a * b.norm_squared()).cross(&normal) / (2.0 * doubled);
+        let centre_m = start + to_centre;
+        let u_m = -to_centre;
+        let w_m = normal.normalize().cross(&u_m);
+        let at_end = end - centre_m;
+        let angle = libm::atan2(at_end.dot(&w_m), at_end.dot(&u_m));
+        Some(Self {
+            centre_m,
+            u_m,
+            w_m,
+            angle_rad: angle.rem_euclid(std::f64::consts::TAU),
+        })
+    }
+
+    /// Place at a share of the arc, with its first and second derivative by it.
+    fn at(&self, share: f64) -> [Vector3<f64>; 3] {
+        let (sin, cos) = libm::sincos(self.angle_rad * share);
+        let from_centre = self.u_m * cos + self.w_m * sin;
+        let along = self.w_m * cos - self.u_m * sin;
+        [
+            self.centre_m + from_centre,
+            along * self.angle_rad,
+            from_centre * -self.angle_rad.powi(2),
+        ]
+    }
+}
+
+/// Sine of the angle at the begin of a circle below which its places lie on a line.
+const LEAST_SINE: f64 = 1e-6;
+
+/// The tool's point along a straight line, or a circle.
 #[derive(Debug)]
 struct ToolLine {
     /// In `base_link`.
@@ -185,6 +245,7 @@ struct ToolLine {
     tcp_from_flange: Pose,
     /// From start to end, m.
     delta_m: Vector3<f64>,
+    circle: Option<Circle>,
     /// Axis times angle, in `base_link`, rad.
     turn_rad: Vector3<f64>,
     /// At even shares of the way.
@@ -213,6 +274,7 @@ impl ToolLine {
             tcp_from_flange: flange_from_tcp.inverse(),
             delta_m: base_link_from_end.translation.vector
                 - base_link_from_start.translation.vector,
+            circle: None,
             turn_rad: rotation_vector(&turn),
             solutions: Vec::new(),
         }
@@ -220,7 +282,7 @@ impl ToolLine {
 
     /// What leads: the translation, or the rotation where there is none.
     fn length(&self) -> f64 {
-        let way_m = self.delta_m.norm();
+        let way_m = self.way_m();
         if way_m >= NO_TRANSLATION_M {
             way_m
         } else {
@@ -228,8 +290,15 @@ impl ToolLine {
         }
     }
 
+    fn way_m(&self) -> f64 {
+        match &self.circle {
+            Some(circle) => circle.angle_rad * circle.u_m.norm(),
+            None => self.delta_m.norm(),
+        }
+    }
+
     fn solved(mut self, kinematics: &Kinematics, start: &Joints) -> Result<Self, NoLine> {
-        let steps = (self.delta_m.norm() / STEP_M).max(self.turn_rad.norm() / STEP_RAD);
+        let steps = (self.way_m() / STEP_M).max(self.turn_rad.norm() / STEP_RAD);
         let steps = steps.ceil().max(LEAST_STEPS);
         if steps.is_nan() || steps > MOST_STEPS {
             return Err(NoLine::OutOfReach(0.0));
@@ -279,8 +348,17 @@ impl ToolLine {
     fn base_link_from_tcp(&self, share: f64) -> Pose {
         let start = &self.base_link_from_start;
         let turn = UnitQuaternion::from_scaled_axis(self.turn_rad * share);
-        let place = start.translation.vector + self.delta_m * share;
+        let [place, ..] = self.place(share);
         Pose::from_parts(place.into(), turn * start.rotation)
+    }
+
+    /// Place of the tool's point at a share of the way, with its first and second derivative by it.
+    fn place(&self, share: f64) -> [Vector3<f64>; 3] {
+        if let Some(circle) = &self.circle {
+            return circle.at(share);
+        }
+        let start = self.base_link_from_start.translation.vector;
+        [start + self.delta_m * share, self.delta_m, Vector3::zeros()]
     }
 
     /// The flange is at `p + R c`, with `c` fixed in the tool and `R` turning about a fixed axis.
@@ -294,9 +372,13 @@ impl ToolLine {
         let rotation: Rotation3<f64> = self.base_link_from_tcp(share).rotation.into();
         let lever_m = rotation * self.tcp_from_flange.translation.vector;
         let turning = self.turn_rad.cross(&lever_m);
-        let linear = self.delta_m + turning;
+        let [_, along, curving] = self.place(share);
+        let linear = along + turning;
         let twist = stacked(&linear, &self.turn_rad);
-        let bending = stacked(&self.turn_rad.cross(&turning), &Vector3::zeros());
+        let bending = stacked(
+            &(curving + self.turn_rad.cross(&turning)),
+            &Vector3::zeros(),
+        );
 
         let chain = &kinematics.chain;
         let jacobian = chain.jacobian(joints);
@@ -415,6 +497,7 @@ mod tests {
             start(),
             &flange_from_tcp,
             &to,
+            None,
             &pace(1.2, 0.25),
         );
         (leg.unwrap().unwrap(), flange_from_tcp, from, to)
@@ -491,7 +574,7 @@ mod tests {
         let from = kinematics.base_link_from_flange(&start());
         let mut to = from;
         to.translation.vector.x += 3.0;
-        let found = Leg::line(&kinematics, start(), &tcp, &to, &pace(1.2, 0.25));
+        let found = Leg::line(&kinematics, start(), &tcp, &to, None, &pace(1.2, 0.25));
         assert!(
             matches!(found, Err(NoLine::OutOfReach(share)) if share < 0.5),
             "{found:?}"
@@ -500,7 +583,7 @@ mod tests {
         let mut to = from;
         to.translation.vector.x = -from.translation.vector.x;
         to.translation.vector.y = -from.translation.vector.y;
-        let found = Leg::line(&kinematics, start(), &tcp, &to, &pace(1.2, 0.25));
+        let found = Leg::line(&kinematics, start(), &tcp, &to, None, &pace(1.2, 0.25));
         assert!(found.is_err());
     }
 }

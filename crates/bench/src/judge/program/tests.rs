@@ -101,6 +101,33 @@ fn a_line_is_straight_between_its_set_points_too() {
 }
 
 #[test]
+fn a_circle_is_round_and_goes_through_its_place() {
+    // Three quarters of a circle of 30 mm about a centre beside the begin.
+    let text = format!(
+        "here = get_target_tcp_pose()\nmovec({}, {}, v = 0.1)",
+        moved_by(0.03, 0.03, 0.0),
+        moved_by(0.03, -0.03, 0.0)
+    );
+    let (_, motion) = moved(&text);
+    let from = tcp_m(&start());
+    let centre = from + Vector3::new(0.03, 0.0, 0.0);
+    let via = from + Vector3::new(0.03, 0.03, 0.0);
+    let mut nearest_m = f64::INFINITY;
+    for (time_s, place) in places_m(&motion) {
+        let off_m = ((place - centre).norm() - 0.03)
+            .abs()
+            .max((place - centre).z.abs());
+        assert!(off_m < 1e-9, "{off_m:e} m at {time_s} s");
+        nearest_m = nearest_m.min((place - via).norm());
+    }
+    assert!(nearest_m < 1e-4);
+    assert!((tcp_m(&motion.end()) - (from + Vector3::new(0.03, -0.03, 0.0))).norm() < 1e-9);
+    let length_m = 0.03 * 1.5 * std::f64::consts::PI;
+    let expected_s = length_m / 0.1 + 2.0 * (0.1 * leg::RAMP_S / 1.2_f64).sqrt();
+    assert!((motion.duration_s() - expected_s).abs() < 1e-9);
+}
+
+#[test]
 fn blends_stay_on_the_lines_and_within_the_radius_of_the_corner() {
     let radius_m = 0.015;
     for second in [[0.0, -0.06, 0.06], [-0.06, -0.06, 0.0], [0.0, -0.12, 0.0]] {
@@ -214,6 +241,11 @@ fn motions_follow_each_other_in_time() {
 fn what_the_arm_cannot_do_is_refused_with_its_line() {
     for (text, line, part) in [
         ("movel(p[3, 0, 0, 0, 0, 0])", 1, "leaves the workspace"),
+        (
+            "h = get_target_tcp_pose() movec(pose_add(h, p[0, 0.01, 0, 0, 0, 0]), pose_add(h, p[0, 0.02, 0, 0, 0, 0]))",
+            1,
+            "lie on a line",
+        ),
         (
             "x = 1\nmovej([90, 0, 0, 0, 0, 0])",
             2,
