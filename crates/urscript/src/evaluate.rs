@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use needlebench_kinematics::Pose;
-
-use crate::builtin::{Builtin, Call, Does, builtin};
+use crate::builtin::{Builtin, Does, builtin};
+use crate::call::Call;
 use crate::lexer::shortened;
 use crate::load::{Entry, Load};
-use crate::motion::{Arm, Belief, Motion, MotionKind};
+use crate::machine::{Installation, Machine};
+use crate::motion::{Arm, Belief};
 use crate::place::{Place, ScriptError};
 use crate::tree::{
     Argument, Expression, ExpressionKind, FunctionKind, Part, Program, Scope, Statement,
@@ -25,24 +25,12 @@ const MOST_CALLS: usize = 200;
 /// Most blocks, expressions and calls within each other while a program runs.
 const MOST_DEPTH: usize = 1000;
 
-/// Most notes of different texts, most lines that one counts, and most that it names.
-const MOST_NOTES: usize = 50;
-const MOST_COUNTED: usize = 100;
-const MOST_LINES: usize = 5;
-
 /// What a loop without end is told.
 const NEVER_ENDS: &str = "does a loop never end, as with `Program Loops Forever` of PolyScope? save the program \
                           without it: only programs that end are judged";
 
 /// Steps that a call of a built-in function counts for.
 const CALL_STEPS: usize = 20;
-
-/// What a program does not say.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Installation {
-    /// The tool's point in the flange's frame until the program sets one.
-    pub flange_from_tcp: Option<Pose>,
-}
 
 /// What came of a program, besides its motions.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -82,18 +70,12 @@ pub fn evaluate(
     };
     let mut evaluator = Evaluator {
         load: &load,
-        arm,
-        installation,
+        machine: Machine::new(arm, installation),
         globals: BTreeMap::new(),
         frames: vec![Frame {
             function,
             locals: None,
         }],
-        belief: Belief::default(),
-        has_moved: false,
-        is_blended: false,
-        motions: 0,
-        notes: Vec::new(),
         steps: 0,
         depth: 0,
     };
@@ -106,38 +88,12 @@ pub fn evaluate(
         }
     }
     evaluator.statements(body)?;
+    let machine = evaluator.machine;
     Ok(Outcome {
-        belief: evaluator.belief,
-        motions: evaluator.motions,
-        notes: evaluator.notes.into_iter().map(Note::into_text).collect(),
+        belief: machine.belief.clone(),
+        motions: machine.motions,
+        notes: machine.into_notes(),
     })
-}
-
-/// A note with the lines that it is about.
-struct Note {
-    text: String,
-    lines: Vec<usize>,
-}
-
-impl Note {
-    fn into_text(self) -> String {
-        let some: Vec<String> = self
-            .lines
-            .iter()
-            .take(MOST_LINES)
-            .map(usize::to_string)
-            .collect();
-        let lines = if self.lines.len() == 1 {
-            "line"
-        } else {
-            "lines"
-        };
-        let more = match self.lines.len().saturating_sub(MOST_LINES) {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        format!("{} ({lines} {}{more})", self.text, some.join(", "))
-    }
 }
 
 /// A function that is being done.
@@ -157,79 +113,16 @@ enum Flow {
 }
 
 /// A program that is being done.
-pub(crate) struct Evaluator<'p, 'a> {
+struct Evaluator<'p, 'a> {
     load: &'p Load<'p>,
-    pub arm: &'a mut dyn Arm,
-    installation: &'a Installation,
+    machine: Machine<'a>,
     globals: BTreeMap<&'p str, Value>,
     frames: Vec<Frame<'p>>,
-    pub belief: Belief,
-    /// The arm was given a motion.
-    pub has_moved: bool,
-    /// The last motion has a blend radius.
-    pub is_blended: bool,
-    motions: usize,
-    notes: Vec<Note>,
     steps: u64,
     depth: usize,
 }
 
 impl<'p> Evaluator<'p, '_> {
-    /// Adds a note, or its line to the note of the same text.
-    pub fn note(&mut self, place: Place, text: &str) {
-        let known = self.notes.iter_mut().find(|note| note.text == text);
-        if let Some(note) = known {
-            if note.lines.len() < MOST_COUNTED && !note.lines.contains(&place.line) {
-                note.lines.push(place.line);
-            }
-        } else if self.notes.len() < MOST_NOTES {
-            self.notes.push(Note {
-                text: text.to_owned(),
-                lines: vec![place.line],
-            });
-        }
-    }
-
-    /// Why something that a program does is not evaluated.
-    #[expect(clippy::unused_self, reason = "said of this evaluation")]
-    pub fn refused(&self, place: Place, name: &str, reason: &str) -> ScriptError {
-        let message = format!("`{name}` {reason}: only fixed arguments are judged");
-        ScriptError::new(place, message)
-            .hint("run the program in the controller's simulator, and judge its RTDE log")
-    }
-
-    /// The tool's point in the flange's frame.
-    pub fn tcp(&self, place: Place) -> Result<Pose, ScriptError> {
-        let known = self
-            .belief
-            .flange_from_tcp
-            .or(self.installation.flange_from_tcp);
-        known.ok_or_else(|| {
-            let message =
-                "the program sets no TCP before this, and that of the installation is not known";
-            ScriptError::new(place, message)
-                .hint("add set_tcp(p[...]) to the program, or say with --tcp which point it is")
-        })
-    }
-
-    /// Gives the arm a motion.
-    pub fn perform(&mut self, motion: &Motion) -> Result<(), ScriptError> {
-        self.arm.perform(motion)?;
-        self.motions += 1;
-        self.has_moved |= !matches!(
-            motion.kind,
-            MotionKind::Stand { .. } | MotionKind::Stop { .. }
-        );
-        self.is_blended = match motion.kind {
-            MotionKind::Joints { blend_m, .. }
-            | MotionKind::Line { blend_m, .. }
-            | MotionKind::Circle { blend_m, .. }
-            | MotionKind::Process { blend_m, .. } => blend_m > 0.0,
-            _ => false,
-        };
-        Ok(())
-    }
-
     fn step(&mut self, place: Place, steps: usize) -> Result<(), ScriptError> {
         self.steps += steps as u64;
         if self.steps <= MOST_STEPS {
@@ -334,7 +227,9 @@ impl<'p> Evaluator<'p, '_> {
                 self.something(handle)?;
             }
             StatementKind::Join(_) => {
-                return Err(self.refused(statement.place, "join", "waits for a thread"));
+                return Err(self
+                    .machine
+                    .refused(statement.place, "join", "waits for a thread"));
             }
             StatementKind::Expression(expression) => {
                 // What a call gives is dropped; a `halt` inside a function ends everything.
@@ -399,7 +294,7 @@ impl<'p> Evaluator<'p, '_> {
         let mut indices: Vec<usize> = Vec::new();
         for part in &target.parts {
             let Part::Element(parts) = part else {
-                return Err(self.refused(place, "struct", "is not evaluated"));
+                return Err(self.machine.refused(place, "struct", "is not evaluated"));
             };
             for index in parts {
                 indices.push(self.index(index)?);
@@ -482,14 +377,16 @@ impl<'p> Evaluator<'p, '_> {
                 let thread = self.load.function(from, name);
                 if thread.is_some_and(|index| self.load.counting.contains(&index)) {
                     let text = "threads that only count are not run";
-                    self.note(place, text);
+                    self.machine.note(place, text);
                     return Ok(Value::Number(0.0));
                 }
-                Err(self.refused(place, "run", "starts a thread"))
+                Err(self.machine.refused(place, "run", "starts a thread"))
             }
             ExpressionKind::Member { name, .. } => {
                 let name = shortened(name);
-                Err(self.refused(place, &name, "belongs to a struct or a remote program"))
+                Err(self
+                    .machine
+                    .refused(place, &name, "belongs to a struct or a remote program"))
             }
             ExpressionKind::Element { of, indices } => {
                 let of = self.something(of)?;
@@ -560,13 +457,13 @@ impl<'p> Evaluator<'p, '_> {
         };
         let function = match builtin.does {
             Does::Refused(reason) => {
-                return Err(self.refused(place, builtin.name, reason.in_words()));
+                return Err(self.machine.refused(place, builtin.name, reason.in_words()));
             }
             Does::Nothing(note) => {
                 for argument in arguments {
                     self.something(&argument.value)?;
                 }
-                self.note(place, note);
+                self.machine.note(place, note);
                 return Ok(Called::Value(Value::Nothing));
             }
             Does::Evaluate(function) => function,
@@ -574,8 +471,13 @@ impl<'p> Evaluator<'p, '_> {
         let values = self.bind(place, &builtin, arguments)?;
         let lists = values.iter().flatten().map(elements);
         self.step(place, CALL_STEPS + lists.sum::<usize>())?;
-        let call = Call::new(place, &builtin, values);
-        self.deeper(place, |inside| function(inside, &call))
+        let call = Call {
+            place,
+            name: builtin.name,
+            values,
+            parameters: builtin.parameters,
+        };
+        self.deeper(place, |inside| function(&mut inside.machine, &call))
             .map(Called::Value)
     }
 
@@ -637,9 +539,11 @@ impl<'p> Evaluator<'p, '_> {
         let function = self.load.functions[index].function;
         match function.kind {
             FunctionKind::Function => {}
-            FunctionKind::Thread => return Err(self.refused(place, "thread", "is called")),
+            FunctionKind::Thread => return Err(self.machine.refused(place, "thread", "is called")),
             FunctionKind::Secondary => {
-                return Err(self.refused(place, "sec", "runs beside the program"));
+                return Err(self
+                    .machine
+                    .refused(place, "sec", "runs beside the program"));
             }
         }
         if self.frames.len() > MOST_CALLS {

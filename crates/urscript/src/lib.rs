@@ -5,10 +5,12 @@
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod builtin;
+mod call;
 mod evaluate;
 mod functions;
 mod lexer;
 mod load;
+mod machine;
 mod motion;
 mod operators;
 mod parser;
@@ -17,7 +19,8 @@ pub mod tree;
 mod value;
 mod walk;
 
-pub use evaluate::{Installation, MOST_STEPS, Outcome, evaluate};
+pub use evaluate::{MOST_STEPS, Outcome, evaluate};
+pub use machine::Installation;
 pub use motion::{Arm, Belief, Motion, MotionKind, Pace};
 pub use parser::{MOST_BYTES, MOST_LEVELS, parse};
 pub use place::{Place, ScriptError};

@@ -217,5 +217,8 @@ fn clearance(posture: &PostureReport) -> String {
 }
 
 fn feasible(posture: &PostureReport) -> String {
-    posture.fault.clone().unwrap_or_else(|| "feasible".to_owned())
+    posture
+        .fault
+        .clone()
+        .unwrap_or_else(|| "feasible".to_owned())
 }

@@ -1,7 +1,7 @@
 //! Strings, lengths and messages.
 
-use crate::builtin::Call;
-use crate::evaluate::Evaluator;
+use crate::call::Call;
+use crate::machine::Machine;
 use crate::place::ScriptError;
 use crate::value::{Value, text};
 
@@ -14,7 +14,7 @@ fn made(call: &Call, new: &str) -> Done {
     text(new).map_err(|message| call.error(message))
 }
 
-pub(crate) fn length(_: &mut Evaluator<'_, '_>, call: &Call) -> Done {
+pub(crate) fn length(_: &mut Machine<'_>, call: &Call) -> Done {
     let count = match call.value(0)? {
         Value::Text(text) => text.chars().count(),
         Value::List(all) => all.len(),
@@ -23,20 +23,20 @@ pub(crate) fn length(_: &mut Evaluator<'_, '_>, call: &Call) -> Done {
     Ok(Value::Number(count as f64))
 }
 
-pub(crate) fn concatenate(_: &mut Evaluator<'_, '_>, call: &Call) -> Done {
+pub(crate) fn concatenate(_: &mut Machine<'_>, call: &Call) -> Done {
     let joined = format!("{}{}", call.value(0)?.text(), call.value(1)?.text());
     made(call, &joined)
 }
 
-pub(crate) fn is_empty(_: &mut Evaluator<'_, '_>, call: &Call) -> Done {
+pub(crate) fn is_empty(_: &mut Machine<'_>, call: &Call) -> Done {
     Ok(Value::Truth(call.text(0)?.is_empty()))
 }
 
-pub(crate) fn to_text(_: &mut Evaluator<'_, '_>, call: &Call) -> Done {
+pub(crate) fn to_text(_: &mut Machine<'_>, call: &Call) -> Done {
     made(call, &call.value(0)?.text())
 }
 
-pub(crate) fn number(_: &mut Evaluator<'_, '_>, call: &Call) -> Done {
+pub(crate) fn number(_: &mut Machine<'_>, call: &Call) -> Done {
     match call.text(0)?.trim().parse::<f64>() {
         Ok(number) if number.is_finite() => Ok(Value::Number(number)),
         _ => Err(call.error("the string is no number")),
@@ -58,14 +58,14 @@ fn said(call: &Call) -> String {
     printable.take(MOST_OF_A_MESSAGE).collect()
 }
 
-pub(crate) fn message(evaluator: &mut Evaluator<'_, '_>, call: &Call) -> Done {
+pub(crate) fn message(machine: &mut Machine<'_>, call: &Call) -> Done {
     call.value(0)?;
-    evaluator.note(call.place, &format!("textmsg: {}", said(call)));
+    machine.note(call.place, &format!("textmsg: {}", said(call)));
     Ok(Value::Nothing)
 }
 
-pub(crate) fn popup(evaluator: &mut Evaluator<'_, '_>, call: &Call) -> Done {
+pub(crate) fn popup(machine: &mut Machine<'_>, call: &Call) -> Done {
     call.value(0)?;
-    evaluator.note(call.place, "popup answered at once");
+    machine.note(call.place, "popup answered at once");
     Ok(Value::Nothing)
 }
