@@ -26,16 +26,27 @@ fn bench() -> Bench {
 
 const QUIET: &str = "--engine rapier --no-pictures --no-page --quiet --json";
 
-#[test]
-fn exported_motions_are_judged_as_the_plan_was() {
-    let bench = bench();
+/// The report of a run, and the configuration that it recommends.
+fn recommended(bench: &Bench) -> (Value, String) {
     let run: Value = bench
         .run(format!("run table3.toml --out ran {QUIET}"))
         .exits_with(0)
         .json();
     let label = run["goals"][0]["recommended"]["label"].word().to_owned();
+    (run, label)
+}
+
+/// A configuration of the report's goal.
+fn configuration<'r>(run: &'r Value, label: &str) -> &'r Value {
     let mut all = run["goals"][0]["configurations"].list().iter();
-    let planned = all.find(|each| each["label"] == label.as_str()).unwrap();
+    all.find(|each| each["label"] == label).unwrap()
+}
+
+#[test]
+fn exported_motions_are_judged_as_the_plan_was() {
+    let bench = bench();
+    let (run, label) = recommended(&bench);
+    let planned = configuration(&run, &label);
     bench
         .run("export table3.toml --as trajectory --json")
         .exits_with(0);
@@ -99,13 +110,8 @@ fn a_corner_fails_by_name_and_every_result_is_written() {
 #[test]
 fn an_exported_program_is_judged_as_the_plan_was() {
     let bench = bench();
-    let run: Value = bench
-        .run(format!("run table3.toml --out ran {QUIET}"))
-        .exits_with(0)
-        .json();
-    let label = run["goals"][0]["recommended"]["label"].word().to_owned();
-    let mut all = run["goals"][0]["configurations"].list().iter();
-    let planned = all.find(|each| each["label"] == label.as_str()).unwrap();
+    let (run, label) = recommended(&bench);
+    let planned = configuration(&run, &label);
     bench
         .run("export table3.toml --as urscript --out program.script")
         .exits_with(0);

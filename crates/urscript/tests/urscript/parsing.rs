@@ -7,6 +7,8 @@ use needlebench_urscript::{MOST_BYTES, MOST_LEVELS, parse};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
+use crate::test_arm::check_error;
+
 fn statements(text: &str) -> Vec<Statement> {
     parse(text)
         .unwrap_or_else(|error| panic!("{error}\n{text}"))
@@ -261,12 +263,7 @@ fn errors_have_line_and_column() {
         ("\u{e4} = 1", 1, 1, "no meaning"),
     ] {
         let error = parse(text).expect_err(text);
-        assert_eq!(
-            (error.place.line, error.place.column),
-            (line, column),
-            "{text}: {error}"
-        );
-        assert!(error.message.contains(part), "{text}: {error}");
+        check_error(&error, (line, column), part, text);
     }
 }
 

@@ -4,7 +4,7 @@ use needlebench_urscript::{Installation, evaluate, parse};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-use crate::test_arm::{TestArm, done};
+use crate::test_arm::{TestArm, check_error, done};
 
 #[test]
 fn what_depends_on_more_than_constants_is_refused_with_its_place() {
@@ -71,12 +71,7 @@ fn what_depends_on_more_than_constants_is_refused_with_its_place() {
         ),
     ] {
         let error = done(text).expect_err(text);
-        assert_eq!(
-            (error.place.line, error.place.column),
-            (line, column),
-            "{text}: {error}"
-        );
-        assert!(error.message.contains(part), "{text}: {error}");
+        check_error(&error, (line, column), part, text);
         assert!(
             error.message.ends_with("only fixed arguments are judged"),
             "{error}"
@@ -155,12 +150,7 @@ fn mistakes_are_said_with_their_place() {
         ("x = p[1, 2, 3, 4, 5, True]", 1, 22, "in a pose"),
     ] {
         let error = done(text).expect_err(text);
-        assert_eq!(
-            (error.place.line, error.place.column),
-            (line, column),
-            "{text}: {error}"
-        );
-        assert!(error.message.contains(part), "{text}: {error}");
+        check_error(&error, (line, column), part, text);
     }
 }
 

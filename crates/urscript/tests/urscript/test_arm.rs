@@ -72,3 +72,10 @@ pub fn done(text: &str) -> Result<(Outcome, Vec<Motion>), ScriptError> {
     assert_eq!(outcome.motions, arm.motions.len());
     Ok((outcome, arm.motions))
 }
+
+/// An error is at a line and column, and says a part.
+pub fn check_error(error: &ScriptError, place: (usize, usize), part: &str, text: &str) {
+    let found = (error.place.line, error.place.column);
+    assert_eq!(found, place, "{text}: {error}");
+    assert!(error.message.contains(part), "{text}: {error}");
+}
