@@ -136,7 +136,7 @@ fn clearance_results(
             unit: "mm",
             pass: is_kept,
             detail: format!(
-                "{}, certified; {:.3} mm attained",
+                "{}, {:.3} mm attained, certified",
                 needlebench_cell::pair_in_words(&found.pair),
                 found.minimum_m * 1e3
             ),

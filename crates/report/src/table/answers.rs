@@ -3,8 +3,10 @@
 use needlebench_bench::judge::answers::{
     AnswerReport, AnswersReport, Defect, PostureReport, QuestionReport, SolutionReport,
 };
-use needlebench_evaluation::report::Verdict;
+use needlebench_cell::ClearanceClass;
 use needlebench_show::{Block, blocks_text};
+
+use super::verdict::capitals;
 
 /// Answers of a question that a screen has room for.
 const MOST_ROWS: usize = 16;
@@ -27,11 +29,7 @@ pub fn answers_text(report: &AnswersReport, whole: bool) -> String {
 
 /// The verdict in a line.
 pub(crate) fn summary(report: &AnswersReport) -> String {
-    let word = match report.verdict {
-        Verdict::Pass => "PASS",
-        Verdict::Fail => "FAIL",
-        Verdict::Incomplete => "INCOMPLETE",
-    };
+    let word = capitals(report.verdict);
     let all = report.source.answers;
     let answers = report.questions.iter().flat_map(|each| &each.answers);
     let wrong = answers.clone().filter(|each| !each.defects.is_empty());
@@ -211,8 +209,13 @@ fn roll(roll_rad: Option<f64>) -> String {
     })
 }
 
+/// What is called the clearance everywhere: of arm and tool from what stands around them.
 fn clearance(posture: &PostureReport) -> String {
-    let least_m = posture.clearance_m.values().copied().reduce(f64::min);
+    let classes = posture.clearance_m.iter();
+    let around = classes.filter(|(class, _)| {
+        ClearanceClass::named(class).is_some_and(ClearanceClass::is_surroundings)
+    });
+    let least_m = around.map(|(_, least_m)| *least_m).reduce(f64::min);
     least_m.map_or("-".to_owned(), |least_m| format!("{:.1}", least_m * 1e3))
 }
 

@@ -2,12 +2,12 @@
 
 use needlebench_bench::judge::free::FreeReport;
 use needlebench_cell::pair_in_words;
-use needlebench_evaluation::report::Verdict;
 use needlebench_show::number::value_and_limit;
 use needlebench_show::{Block, blocks_text};
 
 use super::class_words::class_in_words;
 use super::judged::peak;
+use super::verdict::capitals;
 
 /// The motion as text: the verdict, what failed, the clearances, the joints' limits.
 pub fn free_text(report: &FreeReport) -> String {
@@ -66,11 +66,7 @@ pub fn free_text(report: &FreeReport) -> String {
 }
 
 fn summary(report: &FreeReport) -> String {
-    let word = match report.verdict {
-        Verdict::Pass => "PASS",
-        Verdict::Fail => "FAIL",
-        Verdict::Incomplete => "INCOMPLETE",
-    };
+    let word = capitals(report.verdict);
     let met = report.criteria.iter().filter(|each| each.pass).count();
     let all = report.criteria.len() + report.not_judged.len();
     format!(
