@@ -38,7 +38,7 @@ pub use identify::{
 };
 pub use lag::{Tracking, tracking};
 pub use motion_file::{
-    Known, MotionFile, MotionOptions, MotionSource, motion_of_points, read_motion,
+    Known, MOST_JOINT_RAD, MotionFile, MotionOptions, MotionSource, motion_of_points, read_motion,
 };
 pub use options::{AngleUnit, EffortMeaning, ReadOptions, TimeUnit};
 pub use quantity::Quantity;

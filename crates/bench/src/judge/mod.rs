@@ -204,6 +204,12 @@ pub fn judge(
     })
 }
 
+/// Time between two set-points of the arm's controller, s; none where the arm's data do not say it.
+fn set_point_period_s(resolved: &ResolvedScenario) -> Option<f64> {
+    let used = resolved.robot_description.arm.as_ref()?;
+    Some(used.arm.data.control.as_ref()?.period_ms * 1e-3)
+}
+
 /// Checks where a motion begins; with a note where that is not the start posture.
 fn begin(
     resolved: &ResolvedScenario,

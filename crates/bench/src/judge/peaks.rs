@@ -6,6 +6,8 @@ use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 use needlebench_scenario::ResolvedScenario;
 
+use super::set_point_period_s;
+
 /// Time between two looks at a motion, s, at most.
 const LOOK_S: f64 = 2e-3;
 
@@ -39,7 +41,7 @@ impl Peak {
 /// Velocities at the two sides of a point may differ; the jump counts as an acceleration over the time between two
 /// set-points of the arm's controller, and so does motion at the ends, before and after which the arm stands. The limit of
 /// accelerations is that of the scenario's `[motion]` and 2 % for curves that overshoot between points. Torques are those
-/// of the rigid arm with its tool, without friction.
+/// of the rigid arm with its tool and its rotors, without friction.
 pub(crate) fn peaks(
     resolved: &ResolvedScenario,
     motion: &JointTrajectory,
@@ -49,7 +51,7 @@ pub(crate) fn peaks(
     let limits = &resolved.cell.robot.limits;
     let (speeds, torques) = (limits.velocities_rad_s(), limits.efforts_nm());
     let accelerations = resolved.motion.acceleration * (1.0 + OVERSHOOT);
-    let period_s = period_s(resolved);
+    let period_s = set_point_period_s(resolved).unwrap_or(PERIOD_S);
     let dynamics = resolved.cell.dynamics();
     let mut least: Option<(f64, Peak)> = None;
     let [mut speed, mut acceleration, mut torque]: [Option<Peak>; 3] = [None; 3];
@@ -131,13 +133,6 @@ pub(crate) fn peaks(
     }));
     found.extend(torque.map(|peak| report(peak, "joint_torque", "N m", "torque of the joint")));
     found
-}
-
-/// Time between two set-points of the arm's controller, s.
-fn period_s(resolved: &ResolvedScenario) -> f64 {
-    let used = resolved.robot_description.arm.as_ref();
-    let control = used.and_then(|used| used.arm.data.control.as_ref());
-    control.map_or(PERIOD_S, |control| control.period_ms * 1e-3)
 }
 
 /// A criterion for each peak.

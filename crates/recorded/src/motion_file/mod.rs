@@ -82,7 +82,7 @@ pub struct MotionOptions {
 
 /// No joint of a UR arm turns farther, rad: what is larger is in degrees. (Two revolutions would be refused by the range
 /// of every joint.)
-const MOST_RAD: f64 = std::f64::consts::TAU + 1e-3;
+pub const MOST_JOINT_RAD: f64 = std::f64::consts::TAU + 1e-3;
 
 /// Reads a motion: `trajectory_msgs/JointTrajectory` or MoveIt's `RobotTrajectory` as JSON or YAML, a table, or the
 /// set-points of a log.
@@ -222,7 +222,7 @@ impl Points {
             }
         }
         for (point, joints) in positions.iter().enumerate() {
-            if let Some(joint) = joints.iter().position(|value| value.abs() > MOST_RAD) {
+            if let Some(joint) = joints.iter().position(|value| value.abs() > MOST_JOINT_RAD) {
                 let name = JOINT_NAMES[joint];
                 let message = format!("{name} is {} rad, more than a revolution", joints[joint]);
                 let hint = "joint positions are in radians; are these degrees?";

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use needlebench_kinematics::ik::{Kinematics, nearest_within_limits};
 use needlebench_kinematics::trajectory::JointState;
 use needlebench_kinematics::{JOINT_NAMES, JointLimits, Joints, Pose, base_from_base_link};
+use needlebench_recorded::MOST_JOINT_RAD;
 use needlebench_urscript::{Arm, Motion, MotionKind, Pace, Place, ScriptError};
 
 use super::chain::{Link, MoveChain};
@@ -284,11 +285,8 @@ impl ProgramArm {
     }
 }
 
-/// No joint of a UR arm turns farther, rad.
-const MOST_RAD: f64 = std::f64::consts::TAU + 1e-3;
-
 fn check_posture(place: Place, joints: &Joints) -> Result<(), ScriptError> {
-    let Some(joint) = joints.iter().position(|value| value.abs() > MOST_RAD) else {
+    let Some(joint) = joints.iter().position(|value| value.abs() > MOST_JOINT_RAD) else {
         return Ok(());
     };
     let (name, value) = (JOINT_NAMES[joint], joints[joint]);

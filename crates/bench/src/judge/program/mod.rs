@@ -14,6 +14,7 @@ use needlebench_recorded::{Known, MotionFile, MotionSource};
 use needlebench_scenario::ResolvedScenario;
 use needlebench_urscript::{Belief, Installation, Outcome, ScriptError, evaluate, parse};
 
+use super::set_point_period_s;
 use arm::{Assumed, ProgramArm};
 
 /// The tool's point of a controller's installation, which a program does not say.
@@ -70,15 +71,10 @@ fn program_motion(
     text: &str,
     installed: InstalledTcp,
 ) -> Result<MotionFile, Finding> {
-    let robot = &resolved.robot_description;
-    let control = robot
-        .arm
-        .as_ref()
-        .and_then(|used| used.arm.data.control.as_ref());
-    let Some(control) = control else {
+    let Some(period_s) = set_point_period_s(resolved) else {
         let message = format!(
             "the data of {} do not say how often its controller takes set-points, which a program needs",
-            robot.arm_name
+            resolved.robot_description.arm_name
         );
         let finding = Finding::new(&resolved.source.file, message).key("control.period_ms");
         return Err(finding.hint("choose an arm with [control] in its arm.toml"));
@@ -93,12 +89,7 @@ fn program_motion(
         InstalledTcp::Flange => Some(Pose::identity()),
         InstalledTcp::GuideExit => Some(resolved.cell.tool.flange_from_guide_exit),
     };
-    let mut arm = ProgramArm::new(
-        &kinematics.within(limits),
-        limits,
-        control.period_ms * 1e-3,
-        resolved.start,
-    );
+    let mut arm = ProgramArm::new(&kinematics.within(limits), limits, period_s, resolved.start);
     let wrong = |error: ScriptError| finding(file, text, error);
     let program = parse(text).map_err(wrong)?;
     let outcome = evaluate(&program, &mut arm, &Installation { flange_from_tcp }).map_err(wrong)?;
