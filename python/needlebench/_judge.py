@@ -40,6 +40,7 @@ def judge(
     out: str | os.PathLike[str] | None = None,
     pictures: bool = True,
     page: bool = True,
+    record: Literal["mcap"] | None = None,
     progress: bool | Progress | None = None,
 ) -> Run:
     """Judges a motion as a run judges its own, as ``needlebench judge --motion``.
@@ -64,6 +65,7 @@ def judge(
         out: folder; results are written to ``out/NAME``.
         pictures: with images and charts.
         page: with the report page.
+        record: format of the recordings beside CSV, which are written with ``out``.
         progress: ``True`` shows a bar; a function is called with message, done and total.
 
     Raises:
@@ -88,6 +90,7 @@ def judge(
             out=out,
             pictures=pictures,
             page=page,
+            record=record,
             progress=watch,
         )
     run = Run(native)

@@ -175,6 +175,7 @@ def judge(
     out: _Path | None = None,
     pictures: bool = True,
     page: bool = True,
+    record: str | None = None,
     progress: _Progress | None = None,
 ) -> tuple[Run, BaseException | None]: ...
 def judge_free(

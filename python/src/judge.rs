@@ -20,7 +20,7 @@ use crate::arrays::{Rows, postures};
 use crate::background::{Task, in_background};
 use crate::errors::{input_error, wrong_argument};
 use crate::run::Run;
-use crate::scenario::{Failure, Results, Scenario, threads};
+use crate::scenario::{Failure, Results, Scenario, is_mcap, threads};
 
 /// What stands for the file's name.
 const NAME: &str = "arrays";
@@ -92,7 +92,7 @@ fn failure(error: JudgeError) -> Failure {
 
 /// Judges a motion as a run judges its own; writes to `out/NAME` if `out` is given.
 #[pyfunction]
-#[pyo3(signature = (scenario, times_s, positions_rad, velocities_rad_s=None, accelerations_rad_s2=None, *, goal=None, between=None, any_start=false, beside=true, engines=None, jobs=None, reference=false, out=None, pictures=true, page=true, progress=None))]
+#[pyo3(signature = (scenario, times_s, positions_rad, velocities_rad_s=None, accelerations_rad_s2=None, *, goal=None, between=None, any_start=false, beside=true, engines=None, jobs=None, reference=false, out=None, pictures=true, page=true, record=None, progress=None))]
 #[expect(
     clippy::too_many_arguments,
     clippy::fn_params_excessive_bools,
@@ -115,6 +115,7 @@ pub(crate) fn judge(
     out: Option<PathBuf>,
     pictures: bool,
     page: bool,
+    record: Option<&str>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Run, Option<Py<PyAny>>)> {
     let motion = motion(
@@ -145,10 +146,10 @@ pub(crate) fn judge(
             beside,
         },
         results: Results {
+            mcap: is_mcap(py, record, out.is_some())?,
             folder: out.map(|out| out.join(&resolved.scenario.name)),
             pictures,
             page,
-            mcap: false,
         },
         options,
     };

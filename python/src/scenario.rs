@@ -249,21 +249,14 @@ impl Scenario {
             .map_err(|error| {
                 wrong_argument(py, "engines", error.to_string(), "give names in a list")
             })?;
-        if let Some(format) = record
-            && (format != "mcap" || out.is_none())
-        {
-            let message = format!("recordings as `{format}` cannot be written");
-            let hint = "record=\"mcap\" writes them into the folder that `out` names";
-            return Err(wrong_argument(py, "record", message, hint));
-        }
         let job = Job {
             runnable: Arc::clone(&self.runnable),
             overrides: Arc::clone(&self.overrides),
             results: Results {
+                mcap: is_mcap(py, record, out.is_some())?,
                 folder: out.map(|out| out.join(self.name())),
                 pictures,
                 page,
-                mcap: record.is_some(),
             },
             options,
         };
@@ -302,6 +295,19 @@ pub(crate) struct Results {
     pub pictures: bool,
     pub page: bool,
     pub mcap: bool,
+}
+
+/// Whether recordings are to be written as MCAP files, into a folder that there is.
+pub(crate) fn is_mcap(py: Python<'_>, record: Option<&str>, has_folder: bool) -> PyResult<bool> {
+    match record {
+        None => Ok(false),
+        Some("mcap") if has_folder => Ok(true),
+        Some(format) => {
+            let message = format!("recordings as `{format}` cannot be written");
+            let hint = "record=\"mcap\" writes them into the folder that `out` names";
+            Err(wrong_argument(py, "record", message, hint))
+        }
+    }
 }
 
 impl Results {

@@ -5,6 +5,7 @@ use needlebench_bench::provenance::PROGRAM_VERSION;
 use needlebench_bench::{EngineRun, RealArm, ScenarioRun};
 use needlebench_cell::{ClearanceClass, pair_in_words};
 use needlebench_clearance::MotionCertificate;
+use needlebench_evaluation::judged::JudgedReport;
 use needlebench_evaluation::report::Status;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
@@ -33,6 +34,8 @@ pub struct Motion<'a> {
     pub recorded: &'a EngineRun,
     /// The arm that the engine had.
     pub real_arm: &'a RealArm,
+    /// Where it comes from, if it is somebody else's.
+    pub judged: Option<&'a JudgedReport>,
 }
 
 impl<'a> Motion<'a> {
@@ -48,6 +51,7 @@ impl<'a> Motion<'a> {
             certificate: working.plan().certificate.as_ref(),
             recorded: working.recorded(),
             real_arm: &working.run().real_arm,
+            judged: None,
         }
     }
 
@@ -69,13 +73,14 @@ impl<'a> Motion<'a> {
             certificate: plan.certificate.as_ref(),
             recorded,
             real_arm: &finished.real_arm,
+            judged: finished.report.judged.as_ref(),
         })
     }
 
     /// What it is and where it comes from, by name.
     pub(crate) fn origin(&self) -> Vec<(&'static str, String)> {
         let robot = &self.resolved.robot_description;
-        vec![
+        let mut origin = vec![
             ("program", format!("needlebench {PROGRAM_VERSION}")),
             ("scenario", self.resolved.scenario.name.clone()),
             ("scenario_sha256", self.resolved.source.sha256.clone()),
@@ -90,7 +95,12 @@ impl<'a> Motion<'a> {
                 "engine_version",
                 self.recorded.recording.engine.version.clone(),
             ),
-        ]
+        ];
+        if let Some(judged) = self.judged {
+            origin.push(("motion", judged.file.clone()));
+            origin.push(("motion_sha256", judged.sha256.clone()));
+        }
+        origin
     }
 
     /// Proven lower bounds of the planned motion's clearances by class, m, with the pair that comes nearest; classes

@@ -2,6 +2,7 @@
 
 mod engine;
 mod pictures;
+mod running;
 mod table;
 
 use std::f64::consts::TAU;
@@ -17,6 +18,7 @@ use crate::output::complain;
 
 pub(crate) use engine::{EngineArgument, EngineParser};
 pub(crate) use pictures::PicturesArguments;
+pub(crate) use running::{Record, RunningArguments};
 pub(crate) use table::{TableArguments, leave};
 
 /// A robot in place of the scenario's, and its arm data.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use needlebench_bench::Control;
 use needlebench_bench::ct::{LastScan, scanned};
 use needlebench_bench::judge::answers::{AnswersOptions, TOLERANCE, judge_answers};
 use needlebench_bench::judge::free::judge_free;
@@ -11,7 +12,6 @@ use needlebench_bench::judge::{
     InstalledTcp, JudgeError, JudgeOptions, is_program, judge as judge_motion, read_program,
 };
 use needlebench_bench::progress::Silent;
-use needlebench_bench::{Control, RunOptions};
 use needlebench_evaluation::report::Verdict;
 use needlebench_input::Finding;
 use needlebench_kinematics::trajectory::Between;
@@ -23,9 +23,9 @@ use needlebench_scenario::ResolvedScenario;
 use serde::Serialize;
 
 use super::results_folder::{ResultsFolder, probe_file};
-use super::run::{Outputs, Printed, put, tell_pipeline};
+use super::run::{Outputs, put, tell_pipeline};
 use super::{load, overrides, print_json, print_text};
-use crate::arguments::{EngineArgument, EngineParser, PicturesArguments, RobotArguments};
+use crate::arguments::{RobotArguments, RunningArguments};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
@@ -50,7 +50,7 @@ are those of the course between the points.
 With --answers the joint positions that a solver of inverse kinematics gave are judged against the complete set of \
 solutions: how far each is off, which of the eight it is, what is missing, double or outside the joints' limits.
 
-Results of a motion to a goal in OUT/NAME of the scenario, as of a run.
+Results of a motion to a goal in OUT/NAME of the scenario, as of a run; with --answers or --free none are written.
 
 Example: needlebench judge scenarios/table3.toml --motion plan.json
 Example: needlebench judge cell.toml --motion moveit.yaml --goal lesion --start as-is --engine rapier
@@ -58,7 +58,6 @@ Example: needlebench judge scenarios/table3.toml --motion guide/examples/to_the_
 Example: needlebench judge cell.toml --answers solver.csv --junit solver.xml";
 
 #[derive(Debug, Args)]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct JudgeArguments {
     /// Scenario with the goals.
     #[arg(value_name = "SCENARIO")]
@@ -67,7 +66,11 @@ pub(crate) struct JudgeArguments {
     #[arg(long, value_name = "FILE", required_unless_present = "answers")]
     pub motion: Option<PathBuf>,
     /// Answers of a solver of inverse kinematics to judge instead: CSV, JSON, Parquet or .npy.
-    #[arg(long, value_name = "FILE", conflicts_with = "motion")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["motion", "engine", "referee", "record", "rtde", "no_page"]
+    )]
     pub answers: Option<PathBuf>,
     /// Largest distance (m) and angle (rad) of a right answer [default: 1e-4].
     #[arg(long, value_name = "M_AND_RAD", conflicts_with = "motion", value_parser = tolerance)]
@@ -76,7 +79,7 @@ pub(crate) struct JudgeArguments {
     #[arg(long, conflicts_with = "motion")]
     pub partial: bool,
     /// Judge clearances and joints alone, wherever the motion leads; nothing is simulated.
-    #[arg(long, conflicts_with_all = ["goal", "answers", "engine", "referee", "no_page"])]
+    #[arg(long, conflicts_with_all = ["goal", "answers", "engine", "referee", "record", "rtde", "no_page"])]
     pub free: bool,
     /// Goal that the motion leads to [default: those at which it stands], or that is answered.
     #[arg(long, value_name = "NAME")]
@@ -120,35 +123,8 @@ pub(crate) struct JudgeArguments {
     /// TCP of the controller's installation, for a program that sets none before it needs one.
     #[arg(long, value_enum, value_name = "WHERE", conflicts_with = "answers")]
     pub tcp: Option<TcpArgument>,
-    /// Physics engines [default: those of the scenario].
-    #[arg(long, value_name = "ENGINE[,ENGINE]", value_parser = EngineParser, conflicts_with = "answers")]
-    pub engine: Option<EngineArgument>,
-    /// Verify every motion against the reference integrator at steps h, h/2 and h/4 (3 to 10 times slower).
-    #[arg(long = "reference", conflicts_with = "answers")]
-    pub referee: bool,
-    /// Folder for results; the scenario has a subfolder of its name. None are written with --answers or --free.
-    #[arg(long, value_name = "DIR", default_value = "out")]
-    pub out: PathBuf,
-    /// Print the report as one JSON document instead of the table.
-    #[arg(long)]
-    pub json: bool,
-    /// Also write JUnit XML to this file.
-    #[arg(long, value_name = "FILE")]
-    pub junit: Option<PathBuf>,
-    /// Number of threads [default: all cores]; does not affect results.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
-    pub jobs: Option<u16>,
     #[command(flatten)]
-    pub pictures: PicturesArguments,
-    /// Do not write the report page.
-    #[arg(long)]
-    pub no_page: bool,
-    /// Do not show progress.
-    #[arg(long)]
-    pub quiet: bool,
-    /// Print all tables at full width instead of one screen.
-    #[arg(long, conflicts_with = "json")]
-    pub wide: bool,
+    pub running: RunningArguments,
     #[command(flatten)]
     pub robot: RobotArguments,
 }
@@ -241,7 +217,7 @@ fn read(
 
 /// Judges a motion from a file.
 pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
-    if arguments.wide {
+    if arguments.running.wide {
         print_wide();
     }
     let overrides = overrides(&arguments.robot)?;
@@ -268,49 +244,36 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
             junit,
         );
     }
-    let folder = arguments.out.join(&resolved.scenario.name);
+    let folder = arguments.running.out.join(&resolved.scenario.name);
     let _taken = ResultsFolder::take(&folder)?;
-    if let Some(path) = &arguments.junit {
+    if let Some(path) = &arguments.running.junit {
         probe_file(path, "--junit")?;
     }
     let cancel = watch_interrupts()?;
-    let options = RunOptions {
-        engines: arguments.engine.as_ref().map(EngineArgument::names),
-        jobs: threads(arguments.jobs),
-        referee: arguments.referee,
-        ..RunOptions::default()
-    };
+    let options = arguments.running.options();
     let asked = JudgeOptions {
         goal: arguments.goal.clone(),
         between,
         any_start: arguments.start == StartArgument::AsIs,
         beside: arguments.against == AgainstArgument::Plan,
     };
-    let progress = TerminalProgress::new(arguments.quiet);
+    let progress = TerminalProgress::new(arguments.running.quiet);
     let done = judge_motion(&resolved, &motion, &asked, &options, &cancel, &progress);
     progress.finish();
     let done = done.map_err(failure)?;
-    let outputs = Outputs {
-        rtde: false,
-        mcap: false,
-        pictures: arguments.pictures.are_wanted(arguments.quiet),
-        page: !arguments.no_page,
-        text: Printed::of(arguments.json, arguments.wide),
-        quiet: arguments.quiet,
-    };
     let (status, report) = put(
         &done.resolved,
         &done.run,
         options.jobs,
         &folder,
-        outputs,
+        Outputs::of(&arguments.running),
         &cancel,
         &progress,
     )?;
-    if arguments.json {
+    if arguments.running.json {
         print_json(&report)?;
     }
-    tell_pipeline(&[&report], arguments.junit.as_deref())?;
+    tell_pipeline(&[&report], arguments.running.junit.as_deref())?;
     Ok(status)
 }
 
@@ -320,7 +283,7 @@ fn answers(arguments: &JudgeArguments, resolved: &ResolvedScenario) -> Result<Ex
     let file = read_answers(path.expect("clap asks for a motion or answers"))?;
     let cancel = watch_interrupts()?;
     let control = Control {
-        threads: threads(arguments.jobs),
+        threads: threads(arguments.running.jobs),
         cancel: &cancel,
         progress: &Silent,
     };
@@ -330,7 +293,7 @@ fn answers(arguments: &JudgeArguments, resolved: &ResolvedScenario) -> Result<Ex
         is_partial: arguments.partial,
     };
     let report = judge_answers(resolved, &file, &options, &control).map_err(failure)?;
-    let text = answers_text(&report, arguments.wide);
+    let text = answers_text(&report, arguments.running.wide);
     let junit = answers_junit(&report);
     told(arguments, &report, &text, report.verdict, junit)
 }
@@ -343,12 +306,12 @@ fn told(
     verdict: Verdict,
     junit: Result<String, impl std::error::Error + Send + Sync + 'static>,
 ) -> Result<ExitStatus, Failure> {
-    if let Some(path) = &arguments.junit {
+    if let Some(path) = &arguments.running.junit {
         let junit = junit.map_err(anyhow::Error::from)?;
         write_atomically(path, junit.as_bytes())
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
-    if arguments.json {
+    if arguments.running.json {
         print_json(report)?;
     } else {
         print_text(text.trim_end())?;

@@ -1,10 +1,8 @@
 //! `needlebench run`.
 
-use crate::arguments::{
-    EngineArgument, EngineParser, PicturesArguments, RobotArguments, TableArguments, leave,
-};
+use crate::arguments::{Record, RobotArguments, RunningArguments, TableArguments, leave};
 use crate::output::{complain, print_wide, shown};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -26,61 +24,20 @@ use super::results_folder::{ResultsFolder, prepare_folder, probe_file};
 use super::{load_runnable, overrides, print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
-use crate::interrupts::{threads, watch_interrupts};
+use crate::interrupts::watch_interrupts;
 use crate::progress::TerminalProgress;
 
 #[derive(Debug, Args)]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct RunArguments {
     /// Scenario files.
     #[arg(required = true, value_name = "SCENARIO")]
     pub scenarios: Vec<PathBuf>,
-    /// Physics engines [default: those of the scenario].
-    #[arg(long, value_name = "ENGINE[,ENGINE]", value_parser = EngineParser)]
-    pub engine: Option<EngineArgument>,
-    /// Verify every motion against the reference integrator at steps h, h/2 and h/4 (3 to 10 times slower).
-    #[arg(long = "reference", alias = "referee")]
-    pub referee: bool,
-    /// Folder for results; each scenario has a subfolder of its name.
-    #[arg(long, value_name = "DIR", default_value = "out")]
-    pub out: PathBuf,
-    /// Print the report as one JSON document instead of the table.
-    #[arg(long)]
-    pub json: bool,
-    /// Also write JUnit XML of all scenarios to this file.
-    #[arg(long, value_name = "FILE")]
-    pub junit: Option<PathBuf>,
-    /// Number of threads [default: all cores]; does not affect results.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
-    pub jobs: Option<u16>,
-    /// Also write each motion as an RTDE log, in the format of the UR recorder.
-    #[arg(long)]
-    pub rtde: bool,
-    /// Also write each recorded motion in another format, beside its CSV.
-    #[arg(long, value_name = "FORMAT", value_enum)]
-    pub record: Option<Record>,
     #[command(flatten)]
-    pub pictures: PicturesArguments,
-    /// Do not write the report page.
-    #[arg(long)]
-    pub no_page: bool,
-    /// Do not show progress.
-    #[arg(long)]
-    pub quiet: bool,
-    /// Print all tables at full width instead of one screen.
-    #[arg(long, conflicts_with = "json")]
-    pub wide: bool,
+    pub running: RunningArguments,
     #[command(flatten)]
     pub table: TableArguments,
     #[command(flatten)]
     pub robot: RobotArguments,
-}
-
-/// Format of recordings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Record {
-    /// ROS 2 messages in an MCAP file for each goal, configuration and engine.
-    Mcap,
 }
 
 #[derive(Serialize)]
@@ -91,7 +48,7 @@ struct SeveralReports<'a> {
 
 /// Runs scenarios, writes and prints their results.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
-    if arguments.wide {
+    if arguments.running.wide {
         print_wide();
     }
     let overrides = overrides(&arguments.robot)?;
@@ -120,34 +77,21 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
         }
     }
     let (folders, _taken) = take_folders(arguments, &scenarios)?;
-    if let Some(path) = &arguments.junit {
+    if let Some(path) = &arguments.running.junit {
         probe_file(path, "--junit")?;
     }
     let cancel = watch_interrupts()?;
-    let jobs = threads(arguments.jobs);
-    let options = RunOptions {
-        engines: arguments.engine.as_ref().map(EngineArgument::names),
-        jobs,
-        referee: arguments.referee,
-        ..RunOptions::default()
-    };
+    let options = arguments.running.options();
 
     let mut status = ExitStatus::Success;
     let mut reports = Vec::new();
-    let outputs = Outputs {
-        rtde: arguments.rtde,
-        mcap: arguments.record == Some(Record::Mcap),
-        pictures: arguments.pictures.are_wanted(arguments.quiet),
-        page: !arguments.no_page,
-        text: Printed::of(arguments.json, arguments.wide),
-        quiet: arguments.quiet,
-    };
+    let outputs = Outputs::of(&arguments.running);
     for (scenario, folder) in scenarios.iter().zip(&folders) {
         let scan = Scan {
             folder,
             overrides: &overrides,
-            jobs,
-            quiet: arguments.quiet,
+            jobs: options.jobs,
+            quiet: outputs.quiet,
         };
         let scanned = match scanned(scenario, &scan, &cancel) {
             Ok(scanned) => scanned,
@@ -176,7 +120,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
             break;
         }
     }
-    if arguments.json {
+    if arguments.running.json {
         match reports.as_slice() {
             [report] if arguments.scenarios.len() == 1 => print_json(report)?,
             results => print_json(&SeveralReports {
@@ -186,7 +130,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
         }
     }
     let all: Vec<&Report> = reports.iter().collect();
-    tell_pipeline(&all, arguments.junit.as_deref())?;
+    tell_pipeline(&all, arguments.running.junit.as_deref())?;
     Ok(status)
 }
 
@@ -266,6 +210,24 @@ pub(super) struct Outputs {
     pub quiet: bool,
 }
 
+impl Outputs {
+    /// Those that the command line asks for.
+    pub fn of(arguments: &RunningArguments) -> Self {
+        Self {
+            rtde: arguments.rtde,
+            mcap: arguments.record == Some(Record::Mcap),
+            pictures: arguments.pictures.are_wanted(arguments.quiet),
+            page: !arguments.no_page,
+            text: match (arguments.json, arguments.wide) {
+                (true, _) => Printed::Nothing,
+                (false, false) => Printed::Screen,
+                (false, true) => Printed::All,
+            },
+            quiet: arguments.quiet,
+        }
+    }
+}
+
 /// What a run prints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Printed {
@@ -275,17 +237,6 @@ pub(super) enum Printed {
     Screen,
     /// All tables.
     All,
-}
-
-impl Printed {
-    /// What is printed with `--json` and `--wide`.
-    pub fn of(json: bool, wide: bool) -> Self {
-        match (json, wide) {
-            (true, _) => Self::Nothing,
-            (false, false) => Self::Screen,
-            (false, true) => Self::All,
-        }
-    }
 }
 
 /// Runs one scenario and writes its results into an existing folder.
@@ -393,7 +344,12 @@ fn take_folders(
 ) -> Result<(Vec<PathBuf>, Vec<ResultsFolder>), Failure> {
     let folders: Vec<PathBuf> = scenarios
         .iter()
-        .map(|runnable| arguments.out.join(&runnable.scenario().scenario.name))
+        .map(|runnable| {
+            arguments
+                .running
+                .out
+                .join(&runnable.scenario().scenario.name)
+        })
         .collect();
     let taken = folders.iter().map(|folder| ResultsFolder::take(folder));
     let taken = taken.collect::<Result<_, _>>()?;

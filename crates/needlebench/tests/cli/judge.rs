@@ -85,7 +85,7 @@ fn exported_motions_are_judged_as_the_plan_was() {
 fn a_corner_fails_by_name_and_every_result_is_written() {
     let bench = bench();
     let answer = bench.run(
-        "judge table3.toml --motion straight_line.yaml --engine rapier --no-pictures --quiet --junit junit.xml",
+        "judge table3.toml --motion straight_line.yaml --engine rapier --no-pictures --quiet --junit junit.xml --record mcap",
     );
     let answer = answer.exits_with(1);
     let text = answer.stdout.as_str();
@@ -105,6 +105,21 @@ fn a_corner_fails_by_name_and_every_result_is_written() {
     let report = bench.read_json("out/table3/report.json");
     assert_eq!(report["judged"]["file"], "straight_line.yaml");
     assert!(bench.path("out/table3/report.html").exists());
+    // The recording says whose motion it is, and is read as one.
+    let recorded = "out/table3/pose/Right-Up-Fold.rapier.mcap";
+    let bytes = std::fs::read(bench.path(recorded)).unwrap();
+    let says = |text: &str| {
+        bytes
+            .windows(text.len())
+            .any(|part| part == text.as_bytes())
+    };
+    assert!(says("motion_sha256") && says("straight_line.yaml"));
+    let files = report["goals"][0]["configurations"][0]["files"].list();
+    assert!(
+        files
+            .iter()
+            .any(|name| name == "pose/Right-Up-Fold.rapier.mcap")
+    );
 }
 
 #[test]
