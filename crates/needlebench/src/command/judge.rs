@@ -84,7 +84,7 @@ pub(crate) struct JudgeArguments {
     /// Goal that the motion leads to [default: those at which it stands], or that is answered.
     #[arg(long, value_name = "NAME")]
     pub goal: Option<String>,
-    /// What joins the points [default: quintics with accelerations, cubics with velocities, else straight lines].
+    /// Interpolation between points [default: quintics with accelerations, cubics with velocities, else straight lines].
     #[arg(long, value_enum, value_name = "CURVE", conflicts_with = "answers")]
     pub between: Option<BetweenArgument>,
     /// Where the motion may begin.
@@ -129,7 +129,7 @@ pub(crate) struct JudgeArguments {
     pub robot: RobotArguments,
 }
 
-/// Curves between points.
+/// Interpolation between points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum BetweenArgument {
     /// With the positions, velocities and accelerations of both ends.

@@ -92,8 +92,8 @@ fn a_corner_fails_by_name_and_every_result_is_written() {
     for said in [
         "FAILED pose Right-Up-Fold joint_acceleration",
         "straight joint-space lines at constant speed",
-        "the hold of the scenario was added",
-        "own plan, same configuration, Right-Up-Fold",
+        "extended to the scenario's hold",
+        "needlebench's plan, same configuration (Right-Up-Fold)",
         "needle guide to skin",
     ] {
         // Lines are broken where they are long.
@@ -160,7 +160,7 @@ fn a_program_is_judged_with_what_it_makes_its_controller_believe() {
     let text = words.join(" ");
     for said in [
         "URScript program",
-        "Right-Up-Fold, joints within 0.000 deg of its solution",
+        "Right-Up-Fold, roll 0.0 deg; deviation from the goal: joints 0.000 deg",
         "assumed: moves accelerate with a ramp of 0.14 s",
     ] {
         assert!(text.contains(said), "{said}: {text}");

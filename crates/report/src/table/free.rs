@@ -6,7 +6,7 @@ use needlebench_show::number::value_and_limit;
 use needlebench_show::{Block, blocks_text};
 
 use super::class_words::class_in_words;
-use super::judged::peak;
+use super::judged::peaks;
 use super::verdict::capitals;
 
 /// The motion as text: the verdict, what failed, the clearances, the joints' limits.
@@ -22,21 +22,20 @@ pub fn free_text(report: &FreeReport) -> String {
         ));
     }
     for open in &report.not_judged {
-        lines.push(format!("  OPEN {}: {}", open.criterion, open.reason));
+        lines.push(format!(
+            "  NOT EVALUATED {}: {}",
+            open.criterion, open.reason
+        ));
     }
     lines.push(format!(
-        "motion {}: {}, {} points, {:.3} s; between points {}",
+        "motion {}: {}, {} points, {:.3} s; interpolation: {}",
         report.source.file,
         report.source.format,
         report.source.points,
         report.duration_s,
         report.between
     ));
-    let peaks: Vec<String> = report.peaks.iter().map(peak).collect();
-    lines.push(format!(
-        "nearest to the joints' limits: {}",
-        peaks.join("; ")
-    ));
+    lines.push(peaks(&report.peaks));
     let mut blocks = vec![Block::Lines(lines)];
     let rows = report.clearance.classes.iter().map(|(class, found)| {
         let millimetres = |length_m: f64| format!("{:.2}", length_m * 1e3);
@@ -53,7 +52,7 @@ pub fn free_text(report: &FreeReport) -> String {
         ]
     });
     let header = [
-        "least clearance",
+        "minimum clearance",
         "motion\n(mm)",
         "certified\n(mm)",
         "at (s)",

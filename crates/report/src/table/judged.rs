@@ -19,7 +19,7 @@ pub fn judged_blocks(judged: &JudgedReport) -> Vec<Block> {
         " (the file has no times)"
     };
     let mut blocks = vec![Block::Lines(vec![format!(
-        "motion {}: {}, {} points, {:.3} s{times}; between points {}",
+        "motion {}: {}, {} points, {:.3} s{times}; interpolation: {}",
         judged.file, judged.format, judged.points, judged.duration_s, judged.between
     )])];
     for hold in &judged.holds {
@@ -32,7 +32,7 @@ pub fn judged_blocks(judged: &JudgedReport) -> Vec<Block> {
 fn lines(hold: &HoldReport) -> Vec<String> {
     let [from_s, to_s] = hold.hold_s;
     let added = if hold.is_added {
-        " (the hold of the scenario was added)"
+        " (extended to the scenario's hold)"
     } else {
         ""
     };
@@ -40,32 +40,32 @@ fn lines(hold: &HoldReport) -> Vec<String> {
         .turns
         .filter(|turns| turns.iter().any(|turn| *turn != 0));
     let whole = whole.map_or(String::new(), |turns| format!(", 2π equivalent {turns:?}"));
-    let which = match (hold.label, hold.joint_off_rad) {
-        (Some(label), Some(off_rad)) => format!(
-            "in {label}{whole}, joints within {} of its solution",
-            degrees(off_rad, 3)
+    let (which, joints) = match (hold.label, hold.joint_off_rad) {
+        (Some(label), Some(off_rad)) => (
+            format!("{label}{whole}"),
+            format!("joints {}, ", degrees(off_rad, 3)),
         ),
-        _ => "in none of the eight: at this roll the goal's pose has no solution".to_owned(),
+        _ => (
+            "none of the eight configurations (no solution of the goal at this roll)".to_owned(),
+            String::new(),
+        ),
     };
     let mut lines = vec![format!(
-        "holds at {} from {from_s:.3} s to {to_s:.3} s{added} {which}; roll {}; guide {} mm and {} off its place",
+        "hold at goal {}, {from_s:.3} s to {to_s:.3} s{added}: {which}, roll {}; deviation from the goal: {joints}guide \
+         position {} mm, guide angle {}",
         hold.goal,
         degrees(hold.roll_rad, 1),
         millimetres(hold.guide_off_m),
         degrees(hold.angle_off_rad, 3),
     )];
-    let peaks: Vec<String> = hold.peaks.iter().map(peak).collect();
-    lines.push(format!(
-        "nearest to the joints' limits: {}",
-        peaks.join("; ")
-    ));
+    lines.push(peaks(&hold.peaks));
     if !hold.afterwards_m.is_empty() {
         let all = hold.afterwards_m.iter();
         let all: Vec<String> = all
             .map(|(class, bound_m)| format!("{} {:.1} mm", class_in_words(class), bound_m * 1e3))
             .collect();
         lines.push(format!(
-            "after the hold at least, certified: {}",
+            "certified clearance after the hold: {}",
             all.join(", ")
         ));
     }
@@ -76,7 +76,7 @@ fn lines(hold: &HoldReport) -> Vec<String> {
 fn own_plan(plan: &OwnPlanReport) -> String {
     let OwnPlanReport { label, why, .. } = plan;
     let how = match (&plan.rejected, plan.duration_s) {
-        (Some(rejected), _) => format!("not feasible, {rejected}"),
+        (Some(rejected), _) => format!("infeasible, {rejected}"),
         (None, Some(duration_s)) => format!("{duration_s:.3} s"),
         (None, None) => "no motion".to_owned(),
     };
@@ -93,26 +93,26 @@ fn own_plan(plan: &OwnPlanReport) -> String {
         .take(MOST_NAMED)
         .map(|(left_m, lost_m, class)| {
             format!(
-                "{} by {:.1} mm, to {:.1} mm",
-                class_in_words(class),
+                "{:.1} mm in {} ({:.1} mm left)",
                 lost_m * 1e3,
+                class_in_words(class),
                 left_m * 1e3
             )
         });
     let named: Vec<String> = named.collect();
     let compared = match (plan.rejected.is_some(), named.is_empty()) {
         (true, _) => String::new(),
-        (false, true) => "; the motion comes no nearer to anything".to_owned(),
-        (false, false) => format!("; the motion comes nearer in {}", named.join("; ")),
+        (false, true) => "; the motion loses no clearance".to_owned(),
+        (false, false) => format!("; the motion loses {}", named.join("; ")),
     };
-    format!("own plan, {why}, {label}: {how}{compared}")
+    format!("needlebench's plan, {why} ({label}): {how}{compared}")
 }
 
 /// Clearances of the motion beside those of the plans.
 fn table(hold: &HoldReport) -> Option<Block> {
     let first = hold.plans.first()?;
     let mut header = vec![
-        "least clearance".to_owned(),
+        "minimum clearance".to_owned(),
         "motion\n(mm)".to_owned(),
         "at (s)".to_owned(),
         "<between".to_owned(),
@@ -143,32 +143,27 @@ fn table(hold: &HoldReport) -> Option<Block> {
     (!rows.is_empty()).then_some(Block::Table { header, rows })
 }
 
-/// A joint's largest value beside its limit.
-pub(super) fn peak(peak: &PeakReport) -> String {
-    let angular = |value: f64| format!("{:.1}", value.to_degrees());
+/// Largest values of the joints beside their limits.
+pub(super) fn peaks(peaks: &[PeakReport]) -> String {
+    let all: Vec<String> = peaks.iter().map(peak).collect();
+    format!("peaks of the joints: {}", all.join("; "))
+}
+
+fn peak(peak: &PeakReport) -> String {
+    let [degrees, whole] = [peak.value.to_degrees(), peak.value];
     let (what, value, limit, unit) = match peak.criterion {
-        "joint_range" => ("position", angular(peak.value), angular(peak.limit), "deg"),
-        "joint_speed" => (
-            "speed",
-            angular(peak.value.abs()),
-            angular(peak.limit),
-            "deg/s",
-        ),
+        "joint_range" => ("position", degrees, peak.limit.to_degrees(), "deg"),
+        "joint_speed" => ("speed", degrees.abs(), peak.limit.to_degrees(), "deg/s"),
         "joint_acceleration" => (
             "acceleration",
-            angular(peak.value.abs()),
-            angular(peak.limit),
+            degrees.abs(),
+            peak.limit.to_degrees(),
             "deg/s^2",
         ),
-        _ => (
-            "torque",
-            format!("{:.1}", peak.value.abs()),
-            format!("{:.1}", peak.limit),
-            "N m",
-        ),
+        _ => ("torque", whole.abs(), peak.limit, "N m"),
     };
     format!(
-        "{what} {value} of {limit} {unit} ({} at {:.3} s)",
+        "{what} {value:.1} {unit}, limit {limit:.1} ({} at {:.3} s)",
         peak.joint, peak.time_s
     )
 }
