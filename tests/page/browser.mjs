@@ -3,6 +3,8 @@ import { existsSync } from 'node:fs';
 import { chromium } from 'playwright-core';
 
 export const SOFTWARE_GL = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
+/** SwiftShader draws the WebGL alone: to put pages together it takes up to eight times as long as the processor. */
+export const SOFTWARE_GL_ALONE = [...SOFTWARE_GL, '--disable-gpu-compositing'];
 export const NO_GL = ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis'];
 
 async function executable() {

@@ -249,13 +249,17 @@ async function addresses(page) {
 }
 
 /**
- * `tools` are those of test.mjs: `{ notBlank, settle }`.
+ * The tools are those of test.mjs.
  * @param {Page} page
- * @param {Page} judge
- * @param {string} name
- * @param {{ notBlank: NotBlank, settle: (page: Page) => Promise<unknown>, out: string }} tools
+ * @param {object} tools
+ * @param {Page} tools.judge
+ * @param {string} tools.name
+ * @param {(line: string) => void} tools.say
+ * @param {NotBlank} tools.notBlank
+ * @param {(page: Page) => Promise<unknown>} tools.settle
+ * @param {string} tools.out
  */
-export async function testStudy(page, judge, name, { notBlank, settle, out }) {
+export async function testStudy(page, { judge, name, say, notBlank, settle, out }) {
   await answerFirst(page);
   await readable(page);
   for (const which of FIGURES) {
@@ -281,9 +285,9 @@ export async function testStudy(page, judge, name, { notBlank, settle, out }) {
       }),
     FIGURES,
   );
-  console.log(`  redraws, ms: ${times.map(({ which, ms }) => `${which} ${ms}`).join(', ')}`);
+  say(`  redraws, ms: ${times.map(({ which, ms }) => `${which} ${ms}`).join(', ')}`);
   for (const { which, ms } of times) assert.ok(ms < REDRAW_MS, `${which} takes ${ms} ms`);
-  console.log(`  ${await ownTool(page)} tools drawn, ${await sharesOfPlaces(page)} places with their shares`);
+  say(`  ${await ownTool(page)} tools drawn, ${await sharesOfPlaces(page)} places with their shares`);
   await figures(page);
   await addresses(page);
   // From a mark to its cases.

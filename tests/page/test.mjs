@@ -10,7 +10,7 @@ import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, statSync } from 'node:fs';
 import { resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
-import { launch, NO_GL, SOFTWARE_GL } from './browser.mjs';
+import { launch, NO_GL, SOFTWARE_GL, SOFTWARE_GL_ALONE } from './browser.mjs';
 import { testLayout } from './layout.mjs';
 import { testNumbers } from './numbers.mjs';
 import {
@@ -30,12 +30,16 @@ import { testStudy } from './study.mjs';
 /** @typedef {import('playwright-core').Page} Page */
 /** @typedef {import('playwright-core').Locator} Locator */
 /** @typedef {import('playwright-core').Browser} Browser */
+/** @typedef {{ judge: Page, name: string, say: (line: string) => void }} Tools */
+/** @typedef {(page: Page, tools: Tools) => Promise<void>} PageTest */
 
 // A study's hundred thousand cases take a moment to unpack.
 /** @type {{ [kind: string]: number }} */
 const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000, search: 2000, replay: 2000 };
 /** @type {{ [kind: string]: number }} */
 const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6, search: 3e6, replay: 3e6 };
+/** A browser uses hardly more than one core. */
+const SIDE_BY_SIDE = 2;
 const SIZE = { width: 1280, height: 900 };
 
 const words = process.argv.slice(2);
@@ -55,6 +59,8 @@ async function open(running, file) {
   /** @type {string[]} */
   const problems = [];
   page.on('console', (message) => {
+    // What the browser says of how it brings WebGL onto the page without a graphics processor.
+    if (message.text().includes('GPU stall due to ReadPixels')) return;
     if (['error', 'warning'].includes(message.type())) problems.push(`${message.type()}: ${message.text()}`);
   });
   page.on('pageerror', (error) => problems.push(error.message));
@@ -196,8 +202,8 @@ async function toggles(page) {
   return labels.length;
 }
 
-/** @param {Page} page @param {Page} judge @param {string} name */
-async function testRun(page, judge, name) {
+/** @type {PageTest} */
+async function testRun(page, { judge, name, say }) {
   await notBlank(judge, page.locator('.view canvas'), 'the 3D view', 200);
   // Our own forward kinematics against the program's.
   const worst = await page.evaluate(() => {
@@ -225,7 +231,7 @@ async function testRun(page, judge, name) {
   await testEvents(page);
   await testCharts(page);
   const count = await toggles(page);
-  console.log(`  ${count} switches work`);
+  say(`  ${count} switches work`);
 
   // Rows: click and arrow keys.
   const rows = page.locator('.panel .choose').first().locator('tbody tr');
@@ -303,8 +309,8 @@ async function testRun(page, judge, name) {
   await page.screenshot({ path: `${out}/${name}-room.png` });
 }
 
-/** @param {Page} page @param {Page} judge @param {string} name */
-async function testAtlas(page, judge, name) {
+/** @type {PageTest} */
+async function testAtlas(page, { judge, name }) {
   await notBlank(judge, page.locator('.view canvas'), 'the 3D view', 200);
   await notBlank(judge, page.locator('.plot canvas').nth(0), 'the strips');
   await notBlank(judge, page.locator('.plot canvas').nth(1), 'the curves');
@@ -350,11 +356,9 @@ async function testAtlas(page, judge, name) {
 
 /**
  * The answer stands first with its interval, every choice has its figure, and placements are pictures.
- * @param {Page} page
- * @param {Page} judge
- * @param {string} name
+ * @type {PageTest}
  */
-async function testSearch(page, judge, name) {
+async function testSearch(page, { judge, name }) {
   const found = await page.evaluate(() => ({
     sentence: document.querySelector('#app .answer .sentence')?.textContent,
     stray: NB.byId('app').innerText.includes('null'),
@@ -387,16 +391,20 @@ async function testSearch(page, judge, name) {
   await page.screenshot({ path: `${out}/${name}-all.png`, fullPage: true });
 }
 
-/** @type {{ [kind: string]: (page: Page, judge: Page, name: string) => Promise<void> }} */
+/** @type {{ [kind: string]: PageTest }} */
 const tests = {
   run: testRun,
   search: testSearch,
   atlas: testAtlas,
-  study: (page, judge, name) => testStudy(page, judge, name, { notBlank, settle, out }),
+  study: (page, tools) => testStudy(page, { ...tools, notBlank, settle, out }),
   replay: async () => {},
 };
 
-for (const given of words) {
+/**
+ * @param {string} given
+ * @param {(line: string) => void} say
+ */
+async function testPage(given, say) {
   const file = resolve(given);
   const html = readFileSync(file, 'utf8');
   const title = html.match(/<title>(run|roll map|study|search): /)?.[1] || 'replay';
@@ -404,16 +412,21 @@ for (const given of words) {
   const name = `${kind}-${words.indexOf(given)}`;
   const bytes = statSync(file).size;
   assert.ok(bytes <= MOST_BYTES[kind], `${given} has ${bytes} bytes`);
-  const running = await launch(SOFTWARE_GL);
-  const judge = await running.newPage();
+  // As a reader's browser puts pages together.
+  const timed = await launch(SOFTWARE_GL);
   // The best of three: other programs run, too.
   let best = Infinity;
-  for (let k = 0; k < 3; k++) {
-    const opened = await open(running, file);
+  for (let k = 0; k < 3 && best > FIRST_VIEW_MS[kind]; k++) {
+    const opened = await open(timed, file);
     best = Math.min(best, opened.timing);
+    assert.deepEqual(opened.problems, []);
     await opened.page.close();
   }
-  console.log(`${kind} ${given}: ${(bytes / 1e6).toFixed(2)} MB, first view after ${Math.round(best)} ms`);
+  await timed.close();
+  say(`${kind} ${given}: ${(bytes / 1e6).toFixed(2)} MB, first view after ${Math.round(best)} ms`);
+  assert.ok(best <= FIRST_VIEW_MS[kind], `first view after ${best} ms`);
+  const running = await launch(SOFTWARE_GL_ALONE);
+  const judge = await running.newPage();
   const { page, problems } = await open(running, file);
   await page.screenshot({ path: `${out}/${name}-first.png` });
   await page.screenshot({ path: `${out}/${name}-whole.png`, fullPage: true });
@@ -423,12 +436,12 @@ for (const given of words) {
   await testLayout(layout.page, { judge, notBlank, settle, shot: (width) => `${out}/${name}-${width}.png` });
   assert.deepEqual(layout.problems, []);
   await layout.page.close();
-  console.log(`  the keyboard reaches ${await walk(page)} controls`);
-  await tests[kind](page, judge, name);
+  say(`  the keyboard reaches ${await walk(page)} controls`);
+  await tests[kind](page, { judge, name, say });
   // On paper: the picture in place of the view, no controls.
   await page.setViewportSize(SIZE);
   const count = sheets(await page.pdf({ path: `${out}/${name}.pdf`, preferCSSPageSize: true, printBackground: true }));
-  console.log(`  ${count} sheets of paper`);
+  say(`  ${count} sheets of paper`);
   if (kind === 'run') assert.ok(count >= 1 && count <= MOST_SHEETS, `${count} sheets of paper`);
   if (await page.locator('.view').count()) {
     await page.emulateMedia({ media: 'print' });
@@ -442,7 +455,6 @@ for (const given of words) {
   }
   assert.deepEqual(problems, []);
   await running.close();
-  assert.ok(best <= FIRST_VIEW_MS[kind], `first view after ${best} ms`);
 
   const plain = await launch(NO_GL);
   const without = await open(plain, file);
@@ -457,4 +469,22 @@ for (const given of words) {
   assert.deepEqual(without.problems, []);
   await plain.close();
 }
+
+const waiting = [...words];
+/** Tests one page after the other; what one says stays together. */
+async function worker() {
+  for (let given = waiting.shift(); given; given = waiting.shift()) {
+    /** @type {string[]} */
+    const lines = [];
+    try {
+      await testPage(given, (line) => lines.push(line));
+    } catch (error) {
+      lines.push(`FAILED ${given}`);
+      throw error;
+    } finally {
+      console.log(lines.join('\n'));
+    }
+  }
+}
+await Promise.all(Array.from({ length: SIDE_BY_SIDE }, worker));
 console.log('pages: all well');
