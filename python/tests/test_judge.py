@@ -53,10 +53,18 @@ def test_a_judged_motion_is_that_of_the_command_line(
     as_csv(tmp_path / "motion.csv", times, positions)
     expected = command_line.json(
         *("judge", scenarios / "table3.toml", "--motion", tmp_path / "motion.csv", "--engine", "rapier"),
-        *("--out", tmp_path / "out", "--no-pictures", "--no-page", "--quiet"),
+        *("--out", tmp_path / "out", "--no-pictures", "--no-page", "--quiet", "--record", "mcap"),
         status=1,
     )
-    run = nb.judge(table3, times, positions, engines=["rapier"], out=tmp_path / "package", pictures=False, page=False)
+    run = nb.judge(
+        *(table3, times, positions),
+        engines=["rapier"],
+        out=tmp_path / "package",
+        pictures=False,
+        page=False,
+        record="mcap",
+    )
+    assert (tmp_path / "package/table3/pose/Right-Up-Fold.rapier.mcap").is_file()
     found = json.loads(run.to_json())
     assert run.verdict == "fail"
     assert list(run["pose"]) == ["Right-Up-Fold"]
