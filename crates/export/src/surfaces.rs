@@ -38,8 +38,8 @@ use MovesWith::{Base, Flange, Link, World};
 /// Surfaces that share group, frame and colour, as one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MergedSurface {
-    /// What it is of: `robot`, `tool`, `skin`, `beside` (arms, couch and objects of a scan), `organ`, `bone`, `vessel`, `lesion`,
-    /// `marker`, `table`, `gantry`, `mount`, `obstacle`, `corridor`, `collision`.
+    /// What it is of: `robot`, `tool`, `skin`, `beside` (arms, couch and objects of a scan), `assumed` (body behind
+    /// its cuts), `organ`, `bone`, `vessel`, `lesion`, `marker`, `table`, `gantry`, `mount`, `obstacle`, `corridor`, `collision`.
     pub group: &'static str,
     /// What it moves with.
     pub frame: MovesWith,
@@ -121,6 +121,7 @@ impl Surfaces {
         let (group, opacity) = match part.tissue {
             Tissue::Skin => ("skin", 0.22),
             Tissue::Beside => ("beside", 0.5),
+            Tissue::Assumed => ("assumed", 0.3),
             Tissue::Organ => ("organ", 0.4),
             Tissue::Bone => ("bone", 1.0),
             Tissue::Fissure => ("organ", 0.5),

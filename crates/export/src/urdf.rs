@@ -90,8 +90,8 @@ const RESERVED: [&str; 9] = [
 ];
 
 /// Groups of surfaces that a patient has.
-const TISSUES: [&str; 7] = [
-    "skin", "beside", "organ", "bone", "vessel", "lesion", "marker",
+const TISSUES: [&str; 8] = [
+    "skin", "beside", "assumed", "organ", "bone", "vessel", "lesion", "marker",
 ];
 
 /// The link of a collision body.

@@ -83,6 +83,8 @@ pub enum Tissue {
     Marker,
     /// Beside the body in the scan that it is from: an arm, the couch.
     Beside,
+    /// Body that no scan shows and that is assumed behind a cut.
+    Assumed,
 }
 
 impl fmt::Display for Tissue {
@@ -96,6 +98,7 @@ impl fmt::Display for Tissue {
             Self::Lesion => "lesion",
             Self::Marker => "marker",
             Self::Beside => "beside",
+            Self::Assumed => "assumed",
         })
     }
 }
@@ -162,7 +165,8 @@ pub struct Phantom {
     pub lesions: Vec<Lesion>,
     /// Skin markers, in the order of the parameters.
     pub markers: Vec<Marker>,
-    /// What lies beside the body in the scan that it is from: arms, the couch. Carried along with it.
+    /// What lies beside the body in the scan that it is from, arms and the couch, and what is assumed of the body behind
+    /// the scan's cuts. Carried along with it.
     pub beside: Vec<PhantomPart>,
     skin_surface: SkinSurface,
     /// Where a scan ends that the parts are from; none if it ends nowhere.
@@ -278,10 +282,16 @@ impl Phantom {
     /// Where the body may go on behind the cuts of a scan (phantom frame); empty where nothing is cut: of each cut and each
     /// connected piece of the skin beyond its plane, the convex hull of the piece and of what lies straight behind it,
     /// 3 m far. That the body is no wider there than the piece is assumed. A piece is known to go on as something else
-    /// where its corners (phantom frame) are in what is modelled, such as the arms.
+    /// where its corners (phantom frame) are in what is modelled, such as the arms. Behind a cut where parts of
+    /// [`Tissue::Assumed`] stand for the body, it goes on from these, and from as far behind the cut as they reach.
     pub fn unseen_body(&self, is_modelled: impl Fn(&Point3<f64>) -> bool) -> Vec<Solid> {
-        let ends = self.scan_ends.as_ref();
-        ends.map_or_else(Vec::new, |ends| ends.unseen_body(self.skin(), is_modelled))
+        let Some(ends) = &self.scan_ends else {
+            return Vec::new();
+        };
+        let assumed = self.beside.iter();
+        let assumed = assumed.filter(|part| part.tissue == Tissue::Assumed);
+        let assumed: Vec<&Solid> = assumed.map(|part| &part.solid).collect();
+        ends.unseen_body(self.skin(), &assumed, is_modelled)
     }
 
     /// Whether a scan that the parts are from ends at any plane.

@@ -16,6 +16,9 @@ pub struct ScanEnd {
     pub normal: UnitVector3<f64>,
     /// Skin with `normal . p` above this was not seen, m.
     pub offset_m: f64,
+    /// How far behind the plane parts of [`Tissue::Assumed`](crate::Tissue::Assumed) stand for the body, m; 0 where none
+    /// do.
+    pub assumed_m: f64,
 }
 
 /// The ends of a scan.
@@ -48,12 +51,36 @@ impl ScanEnds {
     pub fn unseen_body(
         &self,
         skin: &Solid,
+        assumed: &[&Solid],
         is_modelled: impl Fn(&Point3<f64>) -> bool,
     ) -> Vec<Solid> {
+        let open = self.ends.iter().filter(|end| end.assumed_m <= 0.0);
+        let mut found = self.behind(open, skin, &is_modelled);
+        // Where what is assumed ends.
+        let ends = self.ends.iter().filter(|end| end.assumed_m > 0.0);
+        let far = Self::new(ends.map(ScanEnd::beyond_assumed).collect());
+        for solid in assumed {
+            found.extend(far.behind(far.ends.iter(), solid, &is_modelled));
+        }
+        let solid = |(index, hull): (usize, ConvexMesh)| Solid {
+            name: format!("unseen_{}", index + 1),
+            shape: Shape::Convex(Arc::new(hull)),
+            parent_from_shape: Pose::identity(),
+        };
+        found.into_iter().enumerate().map(solid).collect()
+    }
+
+    /// What of a surface is behind some of the ends, and on from there.
+    fn behind<'e>(
+        &self,
+        ends: impl Iterator<Item = &'e ScanEnd>,
+        solid: &Solid,
+        is_modelled: impl Fn(&Point3<f64>) -> bool,
+    ) -> Vec<ConvexMesh> {
         // A polyhedron is its own surface, whatever the fineness.
-        let mut surface = skin.shape.surface(0.0);
+        let mut surface = solid.shape.surface(0.0);
         for vertex in &mut surface.vertices_m {
-            *vertex = skin.parent_from_shape * *vertex;
+            *vertex = solid.parent_from_shape * *vertex;
         }
         weld(&mut surface);
         let TriangleMesh {
@@ -65,7 +92,7 @@ impl ScanEnds {
             .map(|at| !self.is_seen(at) && is_modelled(at))
             .collect();
         let mut found = Vec::new();
-        for end in &self.ends {
+        for end in ends {
             let depth_m = |corner: u32| end.depth_m(&vertices_m[corner as usize]);
             let is_cut = |corners: &&[u32; 3]| {
                 let mut behind = corners.iter().filter(|&&corner| depth_m(corner) < 0.0);
@@ -82,12 +109,7 @@ impl ScanEnds {
                 found.extend(hull(&self.extruded(end, behind)));
             }
         }
-        let solid = |(index, hull): (usize, ConvexMesh)| Solid {
-            name: format!("unseen_{}", index + 1),
-            shape: Shape::Convex(Arc::new(hull)),
-            parent_from_shape: Pose::identity(),
-        };
-        found.into_iter().enumerate().map(solid).collect()
+        found
     }
 
     /// Points on an end or behind it, and how far the body goes on from them along the normals of all that they are behind.
@@ -108,6 +130,14 @@ impl ScanEnds {
 }
 
 impl ScanEnd {
+    /// The plane up to which the body is assumed.
+    fn beyond_assumed(&self) -> Self {
+        Self {
+            offset_m: self.offset_m + self.assumed_m,
+            ..*self
+        }
+    }
+
     /// How far a point is before the plane, m; negative behind it.
     fn depth_m(&self, point: &Point3<f64>) -> f64 {
         self.offset_m - self.normal.dot(&point.coords)

@@ -606,6 +606,7 @@ fn a_cut_body_may_go_on_behind_its_cut() {
     let cut = whole.with_scan_ends(vec![ScanEnd {
         normal: Vector3::z_axis(),
         offset_m: half_m - 5e-3,
+        assumed_m: 0.0,
     }]);
     assert!(cut.is_skin_seen(&Point3::new(0.0, 0.0, half_m - 6e-3)));
     assert!(!cut.is_skin_seen(&Point3::new(0.0, 0.0, half_m - 4e-3)));
@@ -646,4 +647,40 @@ fn a_cut_body_may_go_on_behind_its_cut() {
             );
         }
     }
+}
+
+/// Behind what is assumed the body goes on from there, as wide as that is.
+#[test]
+fn a_body_that_is_assumed_goes_on_from_where_it_ends() {
+    let whole = Phantom::build(&Phantom::size_preset("male-p50-supine").unwrap()).unwrap();
+    let half_m = 0.5e-3 * whole.parameters.as_ref().unwrap().length_mm;
+    let end = ScanEnd {
+        normal: Vector3::z_axis(),
+        offset_m: half_m - 5e-3,
+        assumed_m: 0.3,
+    };
+    let assumed = PhantomPart {
+        name: "assumed".to_owned(),
+        tissue: Tissue::Assumed,
+        organ: None,
+        solid: Solid {
+            name: "assumed".to_owned(),
+            shape: Shape::Cuboid {
+                half_extents_m: Vector3::new(0.2, 0.1, 0.151),
+            },
+            parent_from_shape: Pose::translation(0.0, 0.0, half_m - 5e-3 + 0.15),
+        },
+        color_rgba: SKIN_RGBA,
+    };
+    let cut = whole.with_beside(vec![assumed]).with_scan_ends(vec![end]);
+    let unseen = cut.unseen_body(|_| false);
+    let [unseen] = &unseen[..] else {
+        panic!("one face, {} solids", unseen.len())
+    };
+    let faces = HalfSpaces::of(unseen).unwrap();
+    for (behind_m, wanted_m) in [(0.2, -0.1), (0.3, 0.0), (0.35, 0.05), (3.4, -0.099)] {
+        let depth_m = faces.depth_m(&Point3::new(0.0, 0.0, end.offset_m + behind_m));
+        assert!((depth_m - wanted_m).abs() < 1e-6, "{behind_m} {depth_m}");
+    }
+    assert!(!cut.is_skin_seen(&Point3::new(0.0, 0.0, half_m)));
 }

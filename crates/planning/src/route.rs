@@ -146,9 +146,12 @@ fn margin_m(section: &NeedleRouteSection, tissue: Tissue) -> Option<f64> {
         Tissue::Bone => section.bone_mm,
         Tissue::Vessel => section.vessel_mm,
         Tissue::Organ => section.organ_mm,
-        Tissue::Skin | Tissue::Fissure | Tissue::Lesion | Tissue::Marker | Tissue::Beside => {
-            return None;
-        }
+        Tissue::Skin
+        | Tissue::Fissure
+        | Tissue::Lesion
+        | Tissue::Marker
+        | Tissue::Beside
+        | Tissue::Assumed => return None,
     };
     Some(margin_mm * 1e-3)
 }

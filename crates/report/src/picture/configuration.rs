@@ -56,7 +56,7 @@ impl Backdrop {
                 match part.tissue {
                     Tissue::Skin => color_rgba[3] = 0.22,
                     Tissue::Organ => color_rgba[3] = 0.4,
-                    Tissue::Beside => color_rgba[3] = 0.5,
+                    Tissue::Beside | Tissue::Assumed => color_rgba[3] = 0.5,
                     _ => {}
                 }
                 surfaces.push(SurfaceInstance {

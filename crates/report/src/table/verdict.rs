@@ -41,6 +41,7 @@ pub(crate) fn qualifies(note: &str) -> bool {
         || note.starts_with(needlebench_bench::LEFT_OUT)
         || note.starts_with(needlebench_robot::WITHOUT_SHAPE)
         || note.starts_with(needlebench_robot::ASSUMED_SHAPES)
+        || note.starts_with(needlebench_scenario::ASSUMED_BODY)
         || note.contains(needlebench_robot::STANDS_FOR_IT)
 }
 

@@ -64,7 +64,7 @@ use needle_route::check_needle_route;
 use obstacles::{check_obstacle_names, place_obstacles};
 pub use overrides::Overrides;
 use people::{People, Room, resolve_people};
-pub use phantom::PlacedPhantom;
+pub use phantom::{ASSUMED_BODY, PlacedPhantom};
 use phantom::{off_the_table, place_phantom};
 pub use robot::load_robot;
 pub use servo::ServoSettings;

@@ -30,7 +30,7 @@ impl PartTissue {
             Self::Organ => [15.0, 150.0, 600.0],
             Self::Lung => [60.0, 250.0, 500.0],
             Self::Lesion => [1.0, 20.0, 250.0],
-            Self::Beside => [10.0, 500.0, 3000.0],
+            Self::Beside | Self::Assumed => [10.0, 500.0, 3000.0],
         }
     }
 }
@@ -57,6 +57,7 @@ impl Kind {
                 PartTissue::Lung => "a lung",
                 PartTissue::Lesion => "a lesion",
                 PartTissue::Beside => "something beside the patient",
+                PartTissue::Assumed => "an assumed piece of the body",
             },
             sizes_mm: tissue.sizes_mm(),
             may_be_smaller: false,

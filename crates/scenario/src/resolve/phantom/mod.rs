@@ -12,7 +12,7 @@ use needlebench_geometry::{Placement, PreparedShape, Shape, Solid, separation};
 use needlebench_input::{Finding, Location, ModelSource, TomlText, nearest_name, source_of};
 use needlebench_kinematics::Pose;
 use needlebench_phantom::{
-    PARAMETERS, Phantom, PhantomError, PhantomParameters, PhantomPart, ScanEnd,
+    PARAMETERS, Phantom, PhantomError, PhantomParameters, PhantomPart, ScanEnd, Tissue,
 };
 
 use super::cache::Cache;
@@ -132,7 +132,9 @@ fn is_limb(limbs: &[PhantomPart]) -> impl Fn(&Point3<f64>) -> bool {
         } = &limb.solid;
         (PreparedShape::new(shape), *parent_from_shape)
     };
-    let limbs: Vec<(PreparedShape, Pose)> = limbs.iter().map(prepared).collect();
+    // What is assumed behind a cut does not say what is behind it.
+    let limbs = limbs.iter().filter(|limb| limb.tissue != Tissue::Assumed);
+    let limbs: Vec<(PreparedShape, Pose)> = limbs.map(prepared).collect();
     let ball = PreparedShape::new(&Shape::Sphere {
         radius_m: SAME_LIMB_M,
     });
@@ -171,6 +173,7 @@ pub(super) fn scenario_phantom(
             .map_err(one)?;
     }
     let phantom = cut_phantom(toml, section, phantom).map_err(one)?;
+    notes.extend(assumed_body(section));
     let skin = phantom.skin();
     // A polyhedron is its own surface, whatever the fineness.
     let surface = skin.shape.surface(0.0);
@@ -206,10 +209,29 @@ fn cut_phantom(
                 .hint("a direction away from what was scanned, e.g. [0, 0, 1] for the upper end")
         })?;
         let offset_m = 1e-3 * cut.offset_mm;
-        Ok(ScanEnd { normal, offset_m })
+        Ok(ScanEnd {
+            normal,
+            offset_m,
+            assumed_m: 1e-3 * cut.assumed_mm.unwrap_or(0.0),
+        })
     });
     let ends = cuts.collect::<Result<_, Finding>>()?;
     Ok(phantom.with_scan_ends(ends))
+}
+
+/// What a note of an assumed body begins with: its clearances are no better than what is assumed.
+pub const ASSUMED_BODY: &str = "the body behind ";
+
+/// What is to be known of clearances from a body that is assumed.
+fn assumed_body(section: &PhantomSection) -> Option<String> {
+    let reaches = section.cuts.iter().filter_map(|cut| cut.assumed_mm);
+    let count = reaches.clone().count();
+    let least_mm = reaches.min_by(f64::total_cmp)?;
+    Some(format!(
+        "{ASSUMED_BODY}{count} of {} cuts of the scan is assumed, up to {least_mm} mm: clearances from it are no bounds of \
+         those from the patient",
+        section.cuts.len()
+    ))
 }
 
 /// A phantom without a model is what its parts are.

@@ -21,6 +21,7 @@ fn tissue_of(tissue: PartTissue) -> Tissue {
     match tissue {
         PartTissue::Skin => Tissue::Skin,
         PartTissue::Beside => Tissue::Beside,
+        PartTissue::Assumed => Tissue::Assumed,
         PartTissue::Bone => Tissue::Bone,
         PartTissue::Vessel => Tissue::Vessel,
         PartTissue::Organ | PartTissue::Lung => Tissue::Organ,
@@ -37,6 +38,7 @@ fn color_rgba(tissue: PartTissue) -> [f32; 4] {
         PartTissue::Lung => [0.86, 0.60, 0.62, 0.55],
         PartTissue::Lesion => LESION_RGBA,
         PartTissue::Beside => [0.62, 0.64, 0.68, 1.0],
+        PartTissue::Assumed => [0.72, 0.42, 0.82, 1.0],
     }
 }
 
@@ -97,7 +99,7 @@ pub(crate) fn with_mesh_parts(
     let (mut skin_surface, mut beside) = (None, Vec::new());
     for (index, (section, mesh)) in sections.iter().zip(&meshes).enumerate() {
         let part = part_of(toml, index, section, mesh, notes)?;
-        if section.tissue == PartTissue::Beside {
+        if matches!(section.tissue, PartTissue::Beside | PartTissue::Assumed) {
             beside.push(part);
         } else if part.tissue == Tissue::Skin {
             skin_surface = Some(match HalfSpaces::of(&part.solid) {
@@ -254,7 +256,7 @@ fn part_of(
         triangles: mesh.surface.triangles.clone(),
     };
     let is_skin = section.tissue == PartTissue::Skin;
-    if is_skin || section.tissue == PartTissue::Beside {
+    if is_skin || matches!(section.tissue, PartTissue::Beside | PartTissue::Assumed) {
         // What engines collide with.
         check_thickness(&about_middle.vertices_m).map_err(|why| {
             toml.finding(

@@ -103,7 +103,7 @@ pub(super) fn note_overlaps(
             let tissue = sections[i].tissue;
             !matches!(
                 tissue,
-                PartTissue::Skin | PartTissue::Lesion | PartTissue::Beside
+                PartTissue::Skin | PartTissue::Lesion | PartTissue::Beside | PartTissue::Assumed
             )
         })
         .collect();
