@@ -65,11 +65,11 @@ impl Cut {
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldOfView {
     /// Through the centres of the first and the last slice.
-    ends: [Cut; 2],
+    pub(crate) ends: [Cut; 2],
     /// Through the centres of the outermost voxels.
-    sides: Vec<Cut>,
+    pub(crate) sides: Vec<Cut>,
     /// Larger spacing within slices, m.
-    pixel_m: f64,
+    pub(crate) pixel_m: f64,
 }
 
 impl FieldOfView {
@@ -113,6 +113,11 @@ impl FieldOfView {
             .min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
+    /// Skin so near to a side may be the cut itself, m.
+    pub(crate) fn rim_m(&self) -> f64 {
+        RIM_PIXELS * self.pixel_m
+    }
+
     /// Planes beyond which a skin was not seen: both ends, and the sides that it reaches.
     pub fn cuts(&self, skin: &TriangleMesh) -> Vec<Cut> {
         let inset = |cut: &Cut, by_m: f64| Cut {
@@ -122,7 +127,7 @@ impl FieldOfView {
         let reaches = |cut: &Cut| skin.vertices_m.iter().any(|at| cut.depth_m(at) < 0.0);
         let ends = self.ends.iter().map(|end| inset(end, END_M));
         let sides = self.sides.iter();
-        let sides = sides.map(|side| inset(side, RIM_PIXELS * self.pixel_m));
+        let sides = sides.map(|side| inset(side, self.rim_m()));
         ends.chain(sides.filter(reaches)).collect()
     }
 }

@@ -21,6 +21,7 @@ pub mod markers;
 mod mask;
 mod morphology;
 mod orientation;
+mod outside;
 pub mod read;
 mod reconstruct;
 pub mod registration;
@@ -45,6 +46,7 @@ pub use in_slices::{in_slices, room_for};
 pub use mask::{IndexBox, Mask};
 pub use morphology::{closed, dilated, eroded, opened};
 pub use orientation::{NoOrientation, Orientation};
+pub use outside::{AssumedBody, AssumedPiece, Outside};
 pub use reconstruct::{
     LesionSize, MeasuredLesion, NotGrown, Progress, ReconstructOptions, Reconstruction, Surface,
     SurfaceSizes, reconstruct,

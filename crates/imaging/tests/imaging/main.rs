@@ -4,5 +4,6 @@ mod beside;
 mod contents;
 mod names;
 mod nodules;
+mod outside;
 mod readers;
 mod reconstruct;
