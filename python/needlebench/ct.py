@@ -64,7 +64,7 @@ def build(
         out: folder of the patient.
         lesions: seed point of each lesion by its name, mm in the scan (LPS).
         progress: ``True`` shows a bar; a function is called with message, done and total.
-        options: further options of ``needlebench ct build``.
+        options: further options of ``needlebench ct build``, e.g. ``outside=300``.
 
     Returns:
         The scenario file, for `Scenario.load`.

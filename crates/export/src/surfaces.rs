@@ -39,7 +39,8 @@ use MovesWith::{Base, Flange, Link, World};
 #[derive(Debug, Clone, PartialEq)]
 pub struct MergedSurface {
     /// What it is of: `robot`, `tool`, `skin`, `beside` (arms, couch and objects of a scan), `assumed` (body behind
-    /// its cuts), `organ`, `bone`, `vessel`, `lesion`, `marker`, `table`, `gantry`, `mount`, `obstacle`, `corridor`, `collision`.
+    /// its cuts), `organ`, `bone`, `vessel`, `lesion`, `marker`, `table`, `gantry`, `mount`, `obstacle`, `corridor`,
+    /// `collision`.
     pub group: &'static str,
     /// What it moves with.
     pub frame: MovesWith,

@@ -165,8 +165,8 @@ pub struct Phantom {
     pub lesions: Vec<Lesion>,
     /// Skin markers, in the order of the parameters.
     pub markers: Vec<Marker>,
-    /// What lies beside the body in the scan that it is from, arms and the couch, and what is assumed of the body behind
-    /// the scan's cuts. Carried along with it.
+    /// What lies beside the body in the scan that it is from, arms and the couch, and what is assumed of the body
+    /// behind the scan's cuts. Carried along with it.
     pub beside: Vec<PhantomPart>,
     skin_surface: SkinSurface,
     /// Where a scan ends that the parts are from; none if it ends nowhere.

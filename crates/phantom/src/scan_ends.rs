@@ -16,8 +16,8 @@ pub struct ScanEnd {
     pub normal: UnitVector3<f64>,
     /// Skin with `normal . p` above this was not seen, m.
     pub offset_m: f64,
-    /// How far behind the plane parts of [`Tissue::Assumed`](crate::Tissue::Assumed) stand for the body, m; 0 where none
-    /// do.
+    /// How far behind the plane parts of [`Tissue::Assumed`](crate::Tissue::Assumed) stand for the body, m; 0 where
+    /// none do.
     pub assumed_m: f64,
 }
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Matrix3, Point3};
+use needlebench_geometry::TriangleMesh;
 use needlebench_geometry::mesh::extent_m;
 use needlebench_imaging::markers::{DetectedMarker, Found, MarkerModel, Options, find_markers};
 use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_labels};
@@ -12,9 +13,9 @@ use needlebench_imaging::registration::{
     match_markers, register_weighted,
 };
 use needlebench_imaging::{
-    FieldOfView, ImagingError, LabelFacts, LabelMap, LesionSeed, ReconstructOptions,
-    Reconstruction, Remark, Surface, SurfaceSizes, SurfaceTissue, Volume, VoxelGrid, in_order,
-    reconstruct, resample, resample_labels, structure_of,
+    AssumedBody, BesideKind, FieldOfView, ImagingError, LabelFacts, LabelMap, LesionSeed, Outside,
+    ReconstructOptions, Reconstruction, Remark, Surface, SurfaceSizes, SurfaceTissue, Volume,
+    VoxelGrid, in_order, reconstruct, resample, resample_labels, structure_of,
 };
 use needlebench_scenario::scenario::PartTissue;
 use serde::Serialize;
@@ -57,6 +58,8 @@ pub struct BuildOptions {
     pub markers: Option<KnownMarkers>,
     /// Triangles of surfaces.
     pub sizes: SurfaceSizes,
+    /// How the body is assumed to go on behind the cuts of the scan; nothing is assumed if left out.
+    pub outside: Option<Outside>,
     /// Most bytes that a volume may take.
     pub max_bytes: u64,
 }
@@ -132,6 +135,8 @@ pub struct ScanBuild {
     pub registered: Option<Registered>,
     /// The lesions that have a surface.
     pub targets: Vec<BuiltTarget>,
+    /// The body behind the cuts of the scan; none if none is assumed.
+    pub assumed: Option<AssumedBody>,
     /// What is worth knowing: of the scan, and of the registration.
     pub remarks: Vec<Remark>,
 }
@@ -314,12 +319,39 @@ pub(super) fn register(
         _ => None,
     };
     let targets = targets(&seen.made, registered.as_ref());
+    let assumed = options
+        .outside
+        .and_then(|outside| assumed_body(&seen, outside));
+    remarks.extend(assumed.as_ref().map(in_words));
     Ok(ScanBuild {
         seen,
         registered,
         targets,
+        assumed,
         remarks,
     })
+}
+
+/// The body behind the cuts of a scan; none of a scan without skin.
+fn assumed_body(seen: &SeenScan, outside: Outside) -> Option<AssumedBody> {
+    let arms = seen.made.surfaces.iter();
+    let arms = arms.filter(|surface| surface.name == BesideKind::Arms.name());
+    let arms: Vec<&TriangleMesh> = arms.map(|surface| &surface.mesh).collect();
+    let skin = &seen.made.skin()?.mesh;
+    Some(AssumedBody::of(skin, &arms, &seen.field_of_view, outside))
+}
+
+/// By what a body is assumed.
+fn in_words(assumed: &AssumedBody) -> Remark {
+    let Outside { reach_m, wider_m } = assumed.outside;
+    let [left_mm, back_mm] = wider_m.map(|metres| 1e3 * metres);
+    Remark::new(format!(
+        "the body behind {} cuts is assumed, up to {:.0} mm: at the sides half as far as the tangents of the skin \
+         that was seen enclose; behind the first and the last slice as near them, but up to {left_mm:.0} mm wider to left and right \
+         and {back_mm:.0} mm to front and back; clearances from it are no bounds of those from the patient",
+        assumed.cuts,
+        1e3 * reach_m
+    ))
 }
 
 /// The label map, with its names.

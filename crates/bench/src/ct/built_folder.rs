@@ -46,6 +46,9 @@ pub struct BuildFacts {
     pub overview: Vec<OverviewRow>,
     /// Closed surfaces.
     pub surfaces: Vec<SurfaceFacts>,
+    /// The body behind the cuts of the scan, if one is assumed.
+    #[serde(default)]
+    assumed_body: Option<AssumedBodyFacts>,
     /// Markers, if they were looked for.
     pub markers: Option<MarkersFacts>,
     /// Where the patient is, if markers say it.
@@ -59,8 +62,22 @@ pub struct BuildFacts {
 impl BuildFacts {
     /// Files of the surfaces, relative to the folder.
     pub(super) fn surface_files(&self) -> impl Iterator<Item = &str> {
-        self.surfaces.iter().map(|surface| surface.file.as_str())
+        let assumed = self.assumed_body.iter();
+        let assumed = assumed.flat_map(|assumed| &assumed.surfaces);
+        let surfaces = self.surfaces.iter().map(|surface| surface.file.as_str());
+        surfaces.chain(assumed.map(|piece| piece.file.as_str()))
     }
+}
+
+/// An assumed body.
+#[derive(Debug, Clone, Deserialize)]
+struct AssumedBodyFacts {
+    surfaces: Vec<AssumedPieceFacts>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct AssumedPieceFacts {
+    file: String,
 }
 
 /// A closed surface.

@@ -1,9 +1,12 @@
 //! The folder of what was built from a scan.
 
+use needlebench_geometry::mesh::volume_m3;
 use needlebench_imaging::markers::{DetectedMarker, Rejected};
 use needlebench_imaging::read::Description;
 use needlebench_imaging::registration::{MarkerMatch, Registration};
-use needlebench_imaging::{LabelFacts, LabelMap, LesionSize, Remark, SurfaceError, SurfaceTissue};
+use needlebench_imaging::{
+    LabelFacts, LabelMap, LesionSize, Outside, Remark, SurfaceError, SurfaceTissue,
+};
 use serde::Serialize;
 
 use super::overview::OverviewRow;
@@ -38,6 +41,9 @@ pub struct BuildReport<'b> {
     pub overview: Vec<OverviewRow>,
     /// Closed surfaces.
     pub surfaces: Vec<SurfaceReport<'b>>,
+    /// The body behind the cuts of the scan; none if none is assumed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assumed_body: Option<AssumedBodyReport<'b>>,
     /// Lesions of the label map, then those that were asked for, in that order.
     pub lesions: Vec<LesionReport<'b>>,
     /// Labels of `labels.nii.gz`.
@@ -73,6 +79,31 @@ pub struct SurfaceReport<'b> {
     pub level_hu: Option<f64>,
     /// From the surface of the voxels to this one.
     pub distance_from_voxels: SurfaceError,
+}
+
+/// A body that is assumed where no scan shows it.
+#[derive(Debug, Serialize)]
+pub struct AssumedBodyReport<'b> {
+    /// By what it is assumed.
+    #[serde(flatten)]
+    pub outside: Outside,
+    /// How many cuts of the scan it is behind.
+    pub cuts: usize,
+    /// Its convex pieces; neighbours overlap.
+    pub surfaces: Vec<AssumedPieceReport<'b>>,
+}
+
+/// A convex piece of an assumed body.
+#[derive(Debug, Serialize)]
+pub struct AssumedPieceReport<'b> {
+    /// Its name, as in `[[phantom.parts]]`.
+    pub name: &'b str,
+    /// Its file, in the same folder.
+    pub file: String,
+    /// SHA-256 of the file.
+    pub sha256: String,
+    /// Volume within, m^3.
+    pub volume_m3: f64,
 }
 
 /// A lesion.
@@ -117,6 +148,8 @@ pub struct MarkersReport<'b> {
 pub(super) struct BuildDigests {
     /// Of the surfaces' files, in their order.
     pub surfaces: Vec<String>,
+    /// Of the files of the assumed body, in their order.
+    pub assumed: Vec<String>,
     /// Of the room and the goals.
     pub room: String,
 }
@@ -154,6 +187,21 @@ impl<'b> BuildReport<'b> {
                     distance_from_voxels: surface.error,
                 })
                 .collect(),
+            assumed_body: build.assumed.as_ref().map(|assumed| {
+                let pieces = assumed.pieces.iter().zip(digests.assumed);
+                AssumedBodyReport {
+                    outside: assumed.outside,
+                    cuts: assumed.cuts,
+                    surfaces: pieces
+                        .map(|(piece, sha256)| AssumedPieceReport {
+                            name: &piece.name,
+                            file: surface_file(&piece.name),
+                            sha256,
+                            volume_m3: volume_m3(&piece.hull.0),
+                        })
+                        .collect(),
+                }
+            }),
             lesions: made
                 .lesions
                 .iter()
@@ -185,6 +233,16 @@ impl<'b> BuildReport<'b> {
             targets: &build.targets,
             remarks: build.remarks.clone(),
         }
+    }
+}
+
+impl BuildReport<'_> {
+    /// Files of what was seen and of what is assumed, relative to the folder.
+    pub(super) fn surface_files(&self) -> impl Iterator<Item = &str> {
+        let assumed = self.assumed_body.iter();
+        let assumed = assumed.flat_map(|assumed| &assumed.surfaces);
+        let surfaces = self.surfaces.iter().map(|surface| &*surface.file);
+        surfaces.chain(assumed.map(|piece| &*piece.file))
     }
 }
 

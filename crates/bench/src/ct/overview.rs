@@ -1,7 +1,9 @@
 //! What was found in a scan at a glance: how much of it, from what, how accurate, and what is not known.
 
 use needlebench_cell::part_in_words;
-use needlebench_imaging::{BesideKind, Label, LabelFacts, Surface, SurfaceTissue, structure_of};
+use needlebench_imaging::{
+    AssumedBody, BesideKind, Label, LabelFacts, Surface, SurfaceTissue, structure_of,
+};
 use needlebench_routing::Obstacle;
 use needlebench_scenario::scenario::{NeedleRouteSection, RouteSection};
 use serde::{Deserialize, Serialize};
@@ -164,6 +166,7 @@ const MEDIASTINUM: &str = "mediastinum";
 const MARKERS: &str = "markers";
 const ENDS: &str = "field_of_view";
 const BESIDE: &str = "beside";
+const ASSUMED: &str = AssumedBody::NAME;
 
 /// Contact of the skin with something else that is worth a word, m^2.
 const CONTACT_M2: f64 = 1e-4;
@@ -232,6 +235,14 @@ impl ScanBuild {
         }
         rows.push(self.of_markers());
         rows.push(self.of_ends());
+        rows.extend(self.assumed.as_ref().map(|assumed| OverviewRow {
+            source: OverviewSource::Assumed,
+            ..missing(
+                ASSUMED,
+                "body behind cuts",
+                &format!("beyond {:.0} mm", 1e3 * assumed.outside.reach_m),
+            )
+        }));
         rows
     }
 
@@ -412,7 +423,7 @@ pub fn unlabelled(
             row.tissue,
             Some(SurfaceTissue::Skin | SurfaceTissue::Lesion | SurfaceTissue::Beside)
         );
-        let is_structure = ![MARKERS, ENDS, BESIDE].contains(&row.name.as_str());
+        let is_structure = ![MARKERS, ENDS, BESIDE, ASSUMED].contains(&row.name.as_str());
         is_within && is_structure && row.source != OverviewSource::LabelMap
     };
     let rows = overview.iter().filter(is_in_the_way);

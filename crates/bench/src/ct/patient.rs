@@ -10,12 +10,13 @@ use needlebench_kinematics::Pose;
 use needlebench_phantom::Tissue;
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::scenario::{
-    BuildSection, CovarianceMm2, CutSection, GoalSection, ImagingBlock, PartSection,
+    BuildSection, CovarianceMm2, CutSection, GoalSection, ImagingBlock, PartSection, PartTissue,
     PhantomSection, RegistrationBlock, Scenario,
 };
 
 use super::ScanBuild;
 use super::build::part_tissue;
+use super::files::surface_file;
 
 /// Folder of the surfaces, beside the scenario.
 pub(super) const SURFACES: &str = "surfaces";
@@ -181,7 +182,7 @@ fn phantom(
         surfaces.filter(|surface| !(is_couch_left_out && is_under(surface.tissue, &surface.name)));
     let parts = surfaces.map(|surface| PartSection {
         name: surface.name.clone(),
-        file: format!("{SURFACES}/{}.stl", surface.name),
+        file: surface_file(&surface.name),
         tissue: part_tissue(surface.tissue),
         unit: needlebench_scenario::scenario::LengthUnit::Mm,
         position_mm,
@@ -193,7 +194,18 @@ fn phantom(
             Vec::new()
         },
     });
-    let parts = parts.collect();
+    let pieces = build.assumed.iter().flat_map(|assumed| &assumed.pieces);
+    let pieces = pieces.map(|piece| PartSection {
+        name: piece.name.clone(),
+        file: surface_file(&piece.name),
+        tissue: PartTissue::Assumed,
+        unit: needlebench_scenario::scenario::LengthUnit::Mm,
+        position_mm,
+        rpy_deg: [0.0; 3],
+        flip: false,
+        replaces: Vec::new(),
+    });
+    let parts = parts.chain(pieces).collect();
     let cuts = cuts(build, frame);
     let mut own = own;
     let arms = BesideKind::Arms.name();
@@ -275,11 +287,14 @@ pub(crate) fn couch_left_out(room: &Room<'_>, build: &ScanBuild) -> Option<Remar
 fn cuts(build: &ScanBuild, frame: &PatientFrame) -> Vec<CutSection> {
     let skin = build.seen.made.skin();
     let cuts = skin.map_or_else(Vec::new, |skin| build.seen.field_of_view.cuts(&skin.mesh));
+    let assumed = build.assumed.as_ref();
+    let assumed_mm = assumed.map(|assumed| rounded(1e3 * assumed.outside.reach_m, PLACE_STEP));
     let cuts = cuts.iter().map(|cut| {
         let offset_m = cut.offset_m - cut.normal.dot(&frame.origin_in_ct_m);
         CutSection {
             normal: cut.normal.map(|value| rounded(value, PLACE_STEP)).into(),
             offset_mm: rounded(offset_m * 1e3, PLACE_STEP),
+            assumed_mm,
         }
     });
     cuts.collect()

@@ -3,6 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use needlebench_geometry::TriangleMesh;
 use needlebench_imaging::write::{
     TEMPORARY_PREFIX, stl_bytes, write_bytes, write_label_nifti, write_nifti, write_seg_nrrd,
 };
@@ -83,7 +84,8 @@ pub fn write_patient<'b>(
             std::fs::create_dir(&folder).map_err(|error| not_written(&folder, &error))?;
         }
         let digests = BuildDigests {
-            surfaces: surfaces(aside, build)?,
+            surfaces: surfaces(aside, surfaces_of(build))?,
+            assumed: surfaces(aside, pieces_of(build))?,
             room: room_sha256(room, &goals)?,
         };
         images(aside, build, files, control)?;
@@ -134,16 +136,29 @@ fn room_sha256(room: &Room<'_>, goals: &[GoalSection]) -> Result<String, Imaging
     json(&(room.scenario, goals)).map(|text| sha256_hex(text.as_bytes()))
 }
 
-/// Writes the surfaces; the digest of each.
-fn surfaces(folder: &Path, build: &ScanBuild) -> Result<Vec<String>, ImagingError> {
+/// The surfaces of what was seen, by name.
+fn surfaces_of(build: &ScanBuild) -> impl Iterator<Item = (&str, &TriangleMesh)> {
     let surfaces = build.seen.made.surfaces.iter();
-    surfaces
-        .map(|surface| {
-            let bytes = stl_bytes(&surface.mesh)?;
-            write_bytes(&folder.join(surface_file(&surface.name)), &bytes)?;
-            Ok(sha256_hex(&bytes))
-        })
-        .collect()
+    surfaces.map(|surface| (&*surface.name, &surface.mesh))
+}
+
+/// Those of what is assumed.
+fn pieces_of(build: &ScanBuild) -> impl Iterator<Item = (&str, &TriangleMesh)> {
+    let pieces = build.assumed.iter().flat_map(|assumed| &assumed.pieces);
+    pieces.map(|piece| (&*piece.name, &piece.hull.0))
+}
+
+/// Writes surfaces; the digest of each.
+fn surfaces<'m>(
+    folder: &Path,
+    surfaces: impl Iterator<Item = (&'m str, &'m TriangleMesh)>,
+) -> Result<Vec<String>, ImagingError> {
+    let written = surfaces.map(|(name, mesh)| {
+        let bytes = stl_bytes(mesh)?;
+        write_bytes(&folder.join(surface_file(name)), &bytes)?;
+        Ok(sha256_hex(&bytes))
+    });
+    written.collect()
 }
 
 /// Writes labels, volume and pictures, as far as they are wanted.
@@ -202,7 +217,7 @@ fn replace(
     }
     let set_aside = set_aside(folder, former.as_deref(), names)?;
     remove(&path)?;
-    let kept = |file: &str| report.surfaces.iter().any(|surface| surface.file == file);
+    let kept = |file: &str| report.surface_files().any(|kept| kept == file);
     let surfaces = surfaces.iter().flat_map(BuildFacts::surface_files);
     // What the report of a stranger names is not removed.
     let is_ours = |file: &&str| {

@@ -119,8 +119,8 @@ pub struct CutSection {
     /// Distance of the plane from the phantom's origin along the normal, mm.
     #[schemars(range(min = -10_000.0, max = 10_000.0))]
     pub offset_mm: f64,
-    /// How far behind the plane parts with `tissue = "assumed"` stand for the body, mm: clearances are evaluated against
-    /// these there, and the body may go straight on from where they end. Default: nothing is assumed.
+    /// How far behind the plane parts with `tissue = "assumed"` stand for the body, mm: clearances are evaluated
+    /// against these there, and the body may go straight on from where they end. Default: nothing is assumed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1.0, max = 2000.0))]
     pub assumed_mm: Option<f64>,
@@ -186,8 +186,8 @@ pub enum PartTissue {
     /// Beside the patient in the scan: an arm, the couch, a cushion. It moves with the patient and counts as the
     /// patient in clearances; no needle passes through it.
     Beside,
-    /// Body that no scan shows and that is assumed behind one of its `cuts`. It moves with the patient and counts as the
-    /// patient in clearances; no needle passes through it.
+    /// Body that no scan shows and that is assumed behind one of its `cuts`. It moves with the patient and counts as
+    /// the patient in clearances; no needle passes through it.
     Assumed,
 }
 

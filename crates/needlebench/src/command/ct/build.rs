@@ -15,7 +15,7 @@ use needlebench_bench::{Control, Stop};
 use needlebench_imaging::markers::MarkerModel;
 use needlebench_imaging::read::{ReadVolume, read_label_names};
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker, Registration};
-use needlebench_imaging::{Label, LesionSeed, SurfaceSizes};
+use needlebench_imaging::{AssumedBody, Label, LesionSeed, Outside, SurfaceSizes};
 use needlebench_input::Finding;
 use needlebench_report::picture::{OVERVIEW, SlicePicture, scan_pictures};
 use needlebench_report::table::overview::overview_text;
@@ -102,6 +102,14 @@ pub(crate) struct BuildArguments {
     /// Slice thickness, mm, if it is not in the file.
     #[arg(long, value_name = "MM", value_parser = super::synth::positive)]
     thickness_mm: Option<f64>,
+    /// Assumes the body behind the cuts of the scan, so far: its cross-sections at the ends and the tangents of its
+    /// skin at the sides go on. Clearances are evaluated against it there; it is no bound of the patient.
+    #[arg(long, value_name = "MM", value_parser = reach)]
+    outside: Option<f64>,
+    /// How much wider the assumed body becomes within 100 mm behind the first and the last slice, mm on each side: to
+    /// left and right, and to front and back [default: 125,50].
+    #[arg(long, value_name = "MM,MM", value_parser = wider, requires = "outside")]
+    outside_wider: Option<Wider>,
     /// Number of triangles of the skin surface.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(100..=2_000_000))]
     skin_triangles: Option<u32>,
@@ -168,6 +176,28 @@ fn named_place(text: &str) -> Result<NamedPlace, String> {
         name: name.to_owned(),
         numbers: super::synth::numbers::<3>(numbers)?.0,
     })
+}
+
+/// How much wider an assumed body becomes along x and y, mm.
+#[derive(Debug, Clone, Copy)]
+struct Wider([f64; 2]);
+
+fn wider(text: &str) -> Result<Wider, String> {
+    const MOST_MM: f64 = 500.0;
+    let mm = super::synth::numbers::<2>(text)?.0;
+    if mm.iter().any(|mm| !(0.0..=MOST_MM).contains(mm)) {
+        return Err(format!("expected two lengths from 0 to {MOST_MM} mm"));
+    }
+    Ok(Wider(mm))
+}
+
+fn reach(text: &str) -> Result<f64, String> {
+    const MM: std::ops::RangeInclusive<f64> = 1.0..=2000.0;
+    let mm = super::synth::positive(text)?;
+    if !MM.contains(&mm) {
+        return Err(format!("expected {} to {} mm", MM.start(), MM.end()));
+    }
+    Ok(mm)
 }
 
 #[derive(Serialize)]
@@ -348,6 +378,12 @@ fn built(
                 .map_or(SurfaceSizes::default().skin, |count| count as usize),
             ..SurfaceSizes::default()
         },
+        outside: arguments.outside.map(|reach_mm| Outside {
+            reach_m: 1e-3 * reach_mm,
+            wider_m: arguments
+                .outside_wider
+                .map_or(Outside::USUAL_WIDER_M, |Wider(mm)| mm.map(|mm| 1e-3 * mm)),
+        }),
         max_bytes: arguments.reading.max_bytes(),
     };
     build(read, &options, control).map_err(|error| Stop::of_scan(path, error))
@@ -431,8 +467,12 @@ fn lesions(arguments: &BuildArguments, read: &ReadVolume) -> Result<Vec<LesionSe
     for seed in &all {
         *known.entry(&seed.name).or_default() += 1;
     }
-    let is_taken =
-        |name: &str| TAKEN.contains(&name) || Label::ALL.iter().any(|label| label.name() == name);
+    let is_assumed =
+        |name: &str| arguments.outside.is_some() && name.starts_with(AssumedBody::NAME);
+    let is_taken = |name: &str| {
+        let is_label = || Label::ALL.iter().any(|label| label.name() == name);
+        TAKEN.contains(&name) || is_assumed(name) || is_label()
+    };
     if let Some((name, _)) = known
         .iter()
         .find(|(name, count)| **count > 1 || is_taken(name))

@@ -13,6 +13,13 @@ pub(super) struct Report {
     #[serde(skip)]
     path: PathBuf,
     surfaces: Vec<Surface>,
+    /// None where nothing is assumed behind the cuts of the scan.
+    assumed_body: Option<AssumedBody>,
+}
+
+#[derive(Deserialize)]
+struct AssumedBody {
+    surfaces: Vec<Surface>,
 }
 
 #[derive(Deserialize)]
@@ -69,7 +76,8 @@ impl Report {
         base: &Path,
     ) -> Result<(), Finding> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
-        for surface in &self.surfaces {
+        let assumed = self.assumed_body.iter().flat_map(|body| &body.surfaces);
+        for surface in self.surfaces.iter().chain(assumed) {
             // The same file may be named in several ways.
             let Ok(place) = folder.join(&surface.file).canonicalize() else {
                 continue;

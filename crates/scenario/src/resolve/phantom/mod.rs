@@ -228,8 +228,8 @@ fn assumed_body(section: &PhantomSection) -> Option<String> {
     let count = reaches.clone().count();
     let least_mm = reaches.min_by(f64::total_cmp)?;
     Some(format!(
-        "{ASSUMED_BODY}{count} of {} cuts of the scan is assumed, up to {least_mm} mm: clearances from it are no bounds of \
-         those from the patient",
+        "{ASSUMED_BODY}{count} of {} cuts of the scan is assumed, up to {least_mm} mm: clearances from it are no bounds \
+         of those from the patient",
         section.cuts.len()
     ))
 }
