@@ -1,5 +1,7 @@
 //! The published schemas and the reader of files: what one refuses the other refuses.
 
+use std::sync::LazyLock;
+
 use needlebench_input::Finding;
 use needlebench_scenario::scenario::{parse_scenario, scenario_schema};
 use needlebench_scenario::study::{parse_study, study_schema};
@@ -17,21 +19,32 @@ fn findings(kind: &str, probe: &Probe) -> Vec<Finding> {
     .unwrap_or_default()
 }
 
+type Read = (&'static str, Vec<(Probe, Vec<Finding>)>);
+
+/// Every probe of both schemas, with what the reader dislikes about it: read once, which is what takes time here.
+static READ: LazyLock<[Read; 2]> = LazyLock::new(|| {
+    both().map(|(kind, schema)| {
+        let read = probes(&schema).into_iter().map(|probe| {
+            let found = findings(kind, &probe);
+            (probe, found)
+        });
+        (kind, read.collect())
+    })
+});
+
 fn both() -> [(&'static str, Value); 2] {
     [("scenario", scenario_schema()), ("study", study_schema())]
 }
 
 #[test]
 fn the_reader_refuses_what_is_outside_the_schema_and_nothing_else() {
-    for (kind, schema) in both() {
-        let probes = probes(&schema);
-        let refused = probes.iter().filter(|probe| !probe.fits).count();
+    for (kind, read) in &*READ {
+        let refused = read.iter().filter(|(probe, _)| !probe.fits).count();
         assert!(
-            refused > 50 && probes.len() - refused > 50,
+            refused > 50 && read.len() - refused > 50,
             "{kind}: {refused}"
         );
-        for probe in &probes {
-            let found = findings(kind, probe);
+        for (probe, found) in read {
             assert_eq!(
                 found.is_empty(),
                 probe.fits,
@@ -45,9 +58,8 @@ fn the_reader_refuses_what_is_outside_the_schema_and_nothing_else() {
 
 #[test]
 fn a_refused_value_is_named_with_its_key_and_line() {
-    for (kind, schema) in both() {
-        for probe in probes(&schema).iter().filter(|probe| !probe.fits) {
-            let found = findings(kind, probe);
+    for (kind, read) in &*READ {
+        for (probe, found) in read.iter().filter(|(probe, _)| !probe.fits) {
             if probe.key.contains(", ") {
                 continue;
             }
@@ -59,7 +71,7 @@ fn a_refused_value_is_named_with_its_key_and_line() {
                 "{kind} {}: {found:?}",
                 probe.key
             );
-            for each in &found {
+            for each in found {
                 let is_of_file = !each
                     .key
                     .as_ref()
