@@ -1,5 +1,7 @@
 //! What a scan has seen: the space of its slices, less what a scanner fills around its circle.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_geometry::TriangleMesh;
 
@@ -78,10 +80,12 @@ impl FieldOfView {
     pub fn of(volume: &Volume) -> Self {
         let grid = &volume.grid;
         let [nx, ny, _] = grid.size();
-        let outline = Outline::of(volume);
         let along = |normal: [f64; 3], most: f64| plane(grid, normal, most);
         let [x, y, _] = grid.spacing_m();
-        let round = outline.sides([x, y]);
+        let slices = seen_slices(volume);
+        let round = paddings(volume, slices)
+            .into_iter()
+            .find_map(|padding| Outline::of(volume, slices, padding).sides([x, y]));
         let sides = match round {
             Some(sides) => sides
                 .into_iter()
@@ -94,7 +98,7 @@ impl FieldOfView {
                 along([0.0, 1.0, 0.0], (ny - 1) as f64),
             ],
         };
-        let [first, last] = outline.slices.map(|slice| slice as f64);
+        let [first, last] = slices.map(|slice| slice as f64);
         Self {
             ends: [
                 along([0.0, 0.0, -1.0], -first),
@@ -147,6 +151,44 @@ fn plane(grid: &VoxelGrid, normal: [f64; 3], most: f64) -> Cut {
     }
 }
 
+/// First and last slice that has more than one value: one of air or padding alone shows nothing.
+fn seen_slices(volume: &Volume) -> [usize; 2] {
+    let [nx, ny, nz] = volume.grid.size();
+    let is_seen = |k: &usize| {
+        let slice = &volume.hu[k * nx * ny..(k + 1) * nx * ny];
+        slice[0] > DENSE_HU || slice.iter().any(|&hu| hu != slice[0])
+    };
+    let first = (0..nz).find(is_seen).unwrap_or(0);
+    let last = (0..nz).rev().find(is_seen).unwrap_or(nz - 1);
+    [first, last]
+}
+
+/// Slices of a range that are looked at.
+fn looked_at([first, last]: [usize; 2]) -> impl Iterator<Item = usize> {
+    (first..=last).step_by((last - first + 1).div_ceil(SLICES))
+}
+
+/// What padding may be: that of readers, and the value that most pixels at the border of the image have, as -1024 HU,
+/// which scanners store where they saw nothing.
+fn paddings(volume: &Volume, slices: [usize; 2]) -> Vec<i16> {
+    let [nx, ny, _] = volume.grid.size();
+    let mut counts: BTreeMap<i16, usize> = BTreeMap::new();
+    for k in looked_at(slices) {
+        let slice = &volume.hu[k * nx * ny..(k + 1) * nx * ny];
+        let rows = [0, ny - 1].into_iter();
+        let rows = rows.flat_map(|j| slice[j * nx..(j + 1) * nx].iter());
+        let columns = (0..ny).flat_map(|j| [&slice[j * nx], &slice[j * nx + nx - 1]]);
+        for &hu in rows.chain(columns) {
+            *counts.entry(hu).or_default() += 1;
+        }
+    }
+    let usual = counts.into_iter().filter(|(hu, _)| *hu <= DENSE_HU);
+    let usual = usual.max_by_key(|(_, count)| *count).map(|(hu, _)| hu);
+    let mut found = vec![AIR_HU];
+    found.extend(usual.filter(|&hu| hu != AIR_HU));
+    found
+}
+
 /// Pixels that have another value than padding in any slice.
 struct Outline {
     size: [usize; 2],
@@ -154,31 +196,25 @@ struct Outline {
     is_dense: Vec<bool>,
     /// Pixels with a value in the slice that has the fewest.
     fewest: usize,
-    /// First and last slice with any value.
-    slices: [usize; 2],
 }
 
 impl Outline {
-    fn of(volume: &Volume) -> Self {
-        let [nx, ny, nz] = volume.grid.size();
+    fn of(volume: &Volume, slices: [usize; 2], padding: i16) -> Self {
+        let [nx, ny, _] = volume.grid.size();
         let slice = |k: usize| &volume.hu[k * nx * ny..(k + 1) * nx * ny];
-        let has_any = |k: &usize| slice(*k).iter().any(|&hu| hu != AIR_HU);
-        let first = (0..nz).find(has_any).unwrap_or(0);
-        let last = (0..nz).rev().find(has_any).unwrap_or(nz - 1);
         let mut made = Self {
             size: [nx, ny],
             has_value: vec![false; nx * ny],
             is_dense: vec![false; nx * ny],
             fewest: nx * ny,
-            slices: [first, last],
         };
-        for k in (first..=last).step_by((last - first + 1).div_ceil(SLICES)) {
+        for k in looked_at(slices) {
             let mut count = 0;
             let pixels = made.has_value.iter_mut().zip(&mut made.is_dense);
             for (&hu, (has_value, is_dense)) in slice(k).iter().zip(pixels) {
-                *has_value |= hu != AIR_HU;
+                *has_value |= hu != padding;
                 *is_dense |= hu > DENSE_HU;
-                count += usize::from(hu != AIR_HU);
+                count += usize::from(hu != padding);
             }
             made.fewest = made.fewest.min(count);
         }
@@ -345,6 +381,19 @@ mod tests {
         assert_eq!(seen.sides.len(), SIDES);
         let off_m = from_sides_m(&seen) - 1e-3 * RADIUS_MM;
         assert!((-2e-3..=0.0).contains(&off_m), "{off_m}");
+        // What scanners store where they saw nothing, beside air with noise and without.
+        for noise_of_air in [1, 0] {
+            let scan = volume(|place, noise| {
+                if from_centre_mm(place) > RADIUS_MM {
+                    -1024
+                } else {
+                    AIR_HU + noise_of_air * noise
+                }
+            });
+            let seen = FieldOfView::of(&scan);
+            assert_eq!(seen.sides.len(), SIDES);
+            assert_eq!(from_sides_m(&seen) - 1e-3 * RADIUS_MM, off_m);
+        }
         // A body that fills the circle, too.
         let scan = volume(|place, _| {
             if from_centre_mm(place) > RADIUS_MM {

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 use needlebench_geometry::{PreparedShape, Shape, separation};
+use needlebench_kinematics::Pose;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
