@@ -10,7 +10,7 @@ use needlebench_imaging::{
 use serde::Serialize;
 
 use super::overview::OverviewRow;
-use super::patient::{PatientFrame, SURFACES};
+use super::patient::{PatientFrame, surface_file};
 use super::{BuiltTarget, ScanBuild};
 
 /// What was built, for programs. Lengths in m, places in `ct` (patient LPS) unless said otherwise.
@@ -244,11 +244,6 @@ impl BuildReport<'_> {
         let surfaces = self.surfaces.iter().map(|surface| &*surface.file);
         surfaces.chain(assumed.map(|piece| &*piece.file))
     }
-}
-
-/// The file of a surface, relative to the folder.
-pub(super) fn surface_file(name: &str) -> String {
-    format!("{SURFACES}/{name}.stl")
 }
 
 #[derive(Serialize)]

@@ -16,10 +16,14 @@ use needlebench_scenario::scenario::{
 
 use super::ScanBuild;
 use super::build::part_tissue;
-use super::files::surface_file;
 
 /// Folder of the surfaces, beside the scenario.
 pub(super) const SURFACES: &str = "surfaces";
+
+/// The file of a surface, relative to the scenario.
+pub(super) fn surface_file(name: &str) -> String {
+    format!("{SURFACES}/{name}.stl")
+}
 
 /// Step that places in the scenario are rounded to, mm: far below what anything here is known to.
 const PLACE_STEP: f64 = 1e-6;

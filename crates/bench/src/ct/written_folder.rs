@@ -17,9 +17,9 @@ use super::ScanBuild;
 use super::built_folder::{BuildFacts, read_facts};
 use super::files::{
     BuildDigests, BuildFiles, BuildReport, LABELS_FILE, LabelNames, NAMES_FILE, REPORT_FILE,
-    ROUTES_FILE, SCENARIO_FILE, SEGMENTATION_FILE, SESSION_FILE, SLICES, VOLUME_FILE, surface_file,
+    ROUTES_FILE, SCENARIO_FILE, SEGMENTATION_FILE, SESSION_FILE, SLICES, VOLUME_FILE,
 };
-use super::patient::{Room, SURFACES, couch_left_out, patient_scenario};
+use super::patient::{Room, SURFACES, couch_left_out, patient_scenario, surface_file};
 use crate::{Control, Stop};
 
 /// A patient whose folder was written.

@@ -202,37 +202,44 @@ fn no_criterion_passes_that_was_not_judged() {
         SMALL.find("[criteria]").unwrap(),
         SMALL.find("[recording]").unwrap(),
     );
-    let (mut passed, mut open) = (0, 0);
-    for [key, value] in &criteria {
-        for (arguments, edits) in &ways {
-            let own = format!("[criteria]\n{key} = {value}\n");
-            let text = format!("{}{own}{}", &SMALL[..start], &SMALL[end..]);
-            let text = edits
-                .iter()
-                .fold(text, |text, (from, to)| with_edit(&text, from, to));
-            let bench = Bench::with_scenario(&text);
-            let answer = bench.run(format!("run s.toml{arguments} --json"));
-            if answer.status == Some(2) {
-                holds(&answer.stderr, [key.as_str()]);
-                continue;
-            }
-            let report = answer.json();
-            if report["verdict"] != "pass" {
-                open += 1;
-                continue;
-            }
-            passed += 1;
-            let is_of = |each: &&Value| each["criterion"] == key.as_str();
-            let judged = report["criteria"].list().iter().filter(is_of).count();
-            let configurations = report["goals"][0]["configurations"].list().iter();
-            let working = configurations.filter(|each| each["status"] == "ok").count();
-            let notes = report["notes"].to_string();
-            assert!(
-                judged >= working.max(1) || notes.contains(key.as_str()),
-                "{key}{arguments} {edits:?}: {judged} of {working} judged"
-            );
+    let judged = |[key, value]: &[String; 2], (arguments, edits): &(&str, &[(&str, &str)])| {
+        let own = format!("[criteria]\n{key} = {value}\n");
+        let text = format!("{}{own}{}", &SMALL[..start], &SMALL[end..]);
+        let text = edits
+            .iter()
+            .fold(text, |text, (from, to)| with_edit(&text, from, to));
+        let bench = Bench::with_scenario(&text);
+        let answer = bench.run(format!("run s.toml{arguments} --json --no-page --jobs 1"));
+        if answer.status == Some(2) {
+            holds(&answer.stderr, [key.as_str()]);
+            return [0, 0];
         }
-    }
+        let report = answer.json();
+        if report["verdict"] != "pass" {
+            return [0, 1];
+        }
+        let is_of = |each: &&Value| each["criterion"] == key.as_str();
+        let judged = report["criteria"].list().iter().filter(is_of).count();
+        let configurations = report["goals"][0]["configurations"].list().iter();
+        let working = configurations.filter(|each| each["status"] == "ok").count();
+        let notes = report["notes"].to_string();
+        assert!(
+            judged >= working.max(1) || notes.contains(key.as_str()),
+            "{key}{arguments} {edits:?}: {judged} of {working} judged"
+        );
+        [1, 0]
+    };
+    let of_way = |way| {
+        let all = criteria.iter().map(|criterion| judged(criterion, way));
+        all.fold([0, 0], |sum, each| [sum[0] + each[0], sum[1] + each[1]])
+    };
+    // The last one to end otherwise.
+    let counts: Vec<[usize; 2]> = std::thread::scope(|scope| {
+        let ways = ways.iter().map(|way| scope.spawn(move || of_way(way)));
+        let ways: Vec<_> = ways.collect();
+        ways.into_iter().map(|way| way.join().unwrap()).collect()
+    });
+    let [passed, open] = [0, 1].map(|kind| counts.iter().map(|each| each[kind]).sum::<usize>());
     assert!(passed > 40 && open > 8, "{passed} {open}");
 }
 

@@ -52,7 +52,7 @@ pub fn free_text(report: &FreeReport) -> String {
         ]
     });
     let header = [
-        "minimum clearance",
+        "minimum\nclearance",
         "motion\n(mm)",
         "certified\n(mm)",
         "at (s)",

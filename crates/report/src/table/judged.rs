@@ -112,7 +112,7 @@ fn own_plan(plan: &OwnPlanReport) -> String {
 fn table(hold: &HoldReport) -> Option<Block> {
     let first = hold.plans.first()?;
     let mut header = vec![
-        "minimum clearance".to_owned(),
+        "minimum\nclearance".to_owned(),
         "motion\n(mm)".to_owned(),
         "at (s)".to_owned(),
         "<between".to_owned(),
