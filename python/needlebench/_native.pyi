@@ -21,6 +21,9 @@ __all__ = [
     "fk",
     "ik",
     "invoke",
+    "judge",
+    "judge_answers",
+    "judge_free",
     "main",
 ]
 

@@ -131,7 +131,7 @@ def test_answers_are_those_of_the_command_line(
 
 def test_wrong_arrays_are_refused(table3: nb.Scenario) -> None:
     times, positions = straight(table3)
-    for arguments, keywords, said in [
+    refused: list[tuple[tuple[Any, ...], dict[str, Any], str]] = [
         ((times, positions[:-1]), {}, "41 rows for 42 times"),
         ((times, positions[:, :5]), {}, "it has the shape"),
         ((times[::-1], positions), {}, "not after"),
@@ -141,7 +141,8 @@ def test_wrong_arrays_are_refused(table3: nb.Scenario) -> None:
         ((times, positions), {"between": "cubics"}, "the points have no velocities"),
         ((times, positions), {"goal": "other"}, "the scenario has no goal `other`"),
         ((times, positions), {"engines": ["other"]}, "other"),
-    ]:
+    ]
+    for arguments, keywords, said in refused:
         with pytest.raises(nb.InputError, match=said):
             nb.judge(table3, *arguments, **keywords)
     positions[3, 2] = np.nan
