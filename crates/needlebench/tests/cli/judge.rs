@@ -105,7 +105,7 @@ fn a_corner_fails_by_name_and_every_result_is_written() {
     let report = bench.read_json("out/table3/report.json");
     assert_eq!(report["judged"]["file"], "straight_line.yaml");
     assert!(bench.path("out/table3/report.html").exists());
-    // The recording says whose motion it is, and is read as one.
+    // The recording says whose motion it is.
     let recorded = "out/table3/pose/Right-Up-Fold.rapier.mcap";
     let bytes = std::fs::read(bench.path(recorded)).unwrap();
     let says = |text: &str| {
