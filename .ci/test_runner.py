@@ -241,6 +241,17 @@ class Records(Copy):
         self.assertEqual(told.returncode, 1)
         self.assertIn("it opens what is not among its inputs in .ci/checks.toml:\n  scenarios/table3.toml", told.stdout)
 
+    @unittest.skipUnless(shutil.which("strace"), "programs cannot be traced here")
+    def test_what_git_compares_with_its_index_is_not_opened(self) -> None:
+        index = ["git", "-C", str(self.top)]
+        subprocess.run([*index, "add", "scenarios/table3.toml"], check=True)
+        self.addCleanup(subprocess.run, [*index, "rm", "--quiet", "--cached", "scenarios/table3.toml"], check=True)
+        # As its time is not what the index says, its content is looked at.
+        os.utime(self.top / "scenarios/table3.toml", (1, 1))
+        self.small("GIT_OPTIONAL_LOCKS=0 git status --porcelain --untracked-files=no")
+        told = self.run_checks("small")
+        self.assertEqual(told.returncode, 0, told.stdout)
+
     def test_a_name_that_no_check_has_is_said(self) -> None:
         told = self.run_checks("smal")
         self.assertEqual(told.returncode, 2)

@@ -17,6 +17,10 @@ from .tree import TOP
 STRACE = ["strace", "--follow-forks", "--seccomp-bpf", "--quiet=all", "--decode-fds=path"]
 OPENED = re.compile(r"\b(?:open|openat|openat2)\(.*\) = \d+<([^>]*)>$")
 EXECUTED = re.compile(r'\bexecve(?:at)?\(.*?"([^"]*)".* = 0$')
+PROCESS = re.compile(r"^(\d+) ")
+# git compares with its index what was checked out while the index was written: in a fresh clone, any file of the last
+# tick of its clock. It is asked whether something was changed, and what else a file says comes to nothing.
+COMPARES = "git"
 # Every cargo reads the manifests of all members before it knows which it needs; what they say about the crates of
 # others is in the lock file. Linters and git look for what to leave out.
 READ_BY_TOOLS = re.compile(
@@ -43,10 +47,16 @@ def opened(log: Path) -> set[str]:
     known = tree.files()
     # A symbolic link is opened as what it leads to.
     found = set()
+    comparing: set[str] = set()
     with log.open(errors="replace") as lines:
-        for line in lines:
-            match = OPENED.search(line.rstrip("\n")) or EXECUTED.search(line.rstrip("\n"))
-            if match and match[1].startswith(top):
+        for each in lines:
+            line = each.rstrip("\n")
+            executed = EXECUTED.search(line)
+            process = PROCESS.match(line)
+            if executed and process:
+                (comparing.add if Path(executed[1]).name == COMPARES else comparing.discard)(process[1])
+            match = OPENED.search(line) or executed
+            if match and match[1].startswith(top) and not (process and process[1] in comparing):
                 path = match[1].removeprefix(top)
                 if path in known:
                     found.add(path)
