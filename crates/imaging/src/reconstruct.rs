@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use nalgebra::{Matrix3, Point3};
 use needlebench_geometry::TriangleMesh;
-use needlebench_geometry::mesh::{SurfaceIndex, check_closed, volume_m3};
+use needlebench_geometry::mesh::{
+    MeshDefect, SurfaceIndex, check_closed, volume_m3, without_inverted_parts,
+};
 use needlebench_parallel::in_parallel;
 use serde::Serialize;
 
@@ -573,11 +575,16 @@ fn make(scan: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Made
     if fine.triangles.is_empty() {
         return Ok(None);
     }
-    let coarse = sound(simplify(&fine, job.target, MEAN_ERROR_M));
+    let mut coarse = sound(simplify(&fine, job.target, MEAN_ERROR_M));
     if cancel.load(Ordering::Relaxed) {
         return Err(ImagingError::Interrupted);
     }
-    let facts = check_closed(&coarse).map_err(|defect| {
+    let mut checked = check_closed(&coarse);
+    if matches!(checked, Err(MeshDefect::Inverted { .. })) {
+        coarse = without_inverted_parts(&coarse);
+        checked = check_closed(&coarse);
+    }
+    let facts = checked.map_err(|defect| {
         ImagingError::refused(format!("its surface does not enclose a solid: {defect}"))
             .at(job.name.clone())
     })?;

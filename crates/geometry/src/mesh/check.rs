@@ -169,8 +169,44 @@ pub fn inverted_part(mesh: &TriangleMesh) -> Option<MeshDefect> {
     first_inverted(mesh, components(mesh))
 }
 
+/// A closed mesh without its parts that are inside out, such as cavities whose shell was reduced until it no longer
+/// encloses them: what they took from the solid is filled.
+pub fn without_inverted_parts(mesh: &TriangleMesh) -> TriangleMesh {
+    let inverted = inverted(mesh, components(mesh));
+    let parts = connected_parts(mesh);
+    let stays = |part: &&Vec<usize>| !part.iter().any(|triangle| inverted.contains(triangle));
+    let mut kept: Vec<usize> = parts.iter().filter(stays).flatten().copied().collect();
+    kept.sort_unstable();
+    let mut number = vec![None; mesh.vertices_m.len()];
+    let mut vertices_m = Vec::new();
+    let triangles = kept.into_iter().map(|triangle| {
+        mesh.triangles[triangle].map(|vertex| {
+            *number[vertex as usize].get_or_insert_with(|| {
+                vertices_m.push(mesh.vertices_m[vertex as usize]);
+                u32::try_from(vertices_m.len() - 1).unwrap_or(u32::MAX)
+            })
+        })
+    });
+    let triangles = triangles.collect();
+    TriangleMesh {
+        vertices_m,
+        triangles,
+    }
+}
+
 /// Of the parts that these triangles belong to.
 fn first_inverted(mesh: &TriangleMesh, parts: Vec<usize>) -> Option<MeshDefect> {
+    let inverted = inverted(mesh, parts);
+    let &triangle = inverted.first()?;
+    Some(MeshDefect::Inverted {
+        triangle,
+        at_m: corners(mesh, mesh.triangles[triangle])[0],
+        count: inverted.len(),
+    })
+}
+
+/// Those of some triangles that face inwards.
+fn inverted(mesh: &TriangleMesh, parts: Vec<usize>) -> Vec<usize> {
     /// A tree takes about as long to build as so many looks at every triangle.
     const FEW_PARTS: usize = 100;
     let tree = (parts.len() > FEW_PARTS).then(|| TriangleTree::new(mesh));
@@ -185,13 +221,7 @@ fn first_inverted(mesh: &TriangleMesh, parts: Vec<usize>) -> Option<MeshDefect> 
         let normal = area_vector([a, b, c]).normalize();
         winding_number(&(middle + normal * beside_m)) < 0
     };
-    let inverted: Vec<usize> = parts.into_iter().filter(faces_inward).collect();
-    let &triangle = inverted.first()?;
-    Some(MeshDefect::Inverted {
-        triangle,
-        at_m: corners(mesh, mesh.triangles[triangle])[0],
-        count: inverted.len(),
-    })
+    parts.into_iter().filter(faces_inward).collect()
 }
 
 /// Whether rounding cannot tell a triangle from a line or a point.
@@ -319,6 +349,20 @@ mod tests {
     use crate::sample_solids::{both, bowl, cuboid, ell, inverted, torus};
 
     const BOX: [f64; 3] = [0.03, 0.02, 0.01];
+
+    #[test]
+    fn cavities_outside_their_shell_are_dropped() {
+        let shell = cuboid(BOX);
+        let cavity = inverted(cuboid(BOX.map(|half| 0.2 * half)));
+        let enclosed = both(&shell, &cavity, [0.0; 3]);
+        assert_eq!(without_inverted_parts(&enclosed), enclosed);
+        let mut outside = both(&cavity, &shell, [0.0; 3]);
+        for vertex in &mut outside.vertices_m[..cavity.vertices_m.len()] {
+            vertex.x += 0.1;
+        }
+        assert!(check_closed(&outside).is_err());
+        assert_eq!(without_inverted_parts(&outside), shell);
+    }
 
     #[test]
     fn closed_surfaces_are_sound() {

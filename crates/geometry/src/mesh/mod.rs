@@ -13,7 +13,10 @@ mod stl;
 mod surface_index;
 
 pub use cache::{OtherWriters, forget_kept_meshes, kept_meshes, other_writers};
-pub use check::{MeshDefect, MeshFacts, check_closed, has_no_area, inverted_part, open_edges};
+pub use check::{
+    MeshDefect, MeshFacts, check_closed, has_no_area, inverted_part, open_edges,
+    without_inverted_parts,
+};
 pub(crate) use decompose::as_convex;
 pub use decompose::decompose;
 pub use fidelity::{Fidelity, points_on};
