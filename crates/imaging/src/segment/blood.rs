@@ -1,5 +1,7 @@
 //! Blood with contrast medium in heart and great vessels, which touches bone and is as dense.
 
+use std::borrow::Cow;
+
 use crate::components::{Component, Components, Connectivity};
 use crate::error::ImagingError;
 use crate::mask::{IndexBox, Mask};
@@ -20,6 +22,12 @@ const LEAST_POOL_L: f64 = 20e-3;
 
 /// The brightest blood that is told from bone, HU: beside an injection it is brighter, and stays bone.
 const BRIGHTEST_HU: i16 = 650;
+
+/// Blood is looked for above this where none of it is wholly as dense as bone, HU,
+const FAINT_HU: f64 = 100.5;
+
+/// and has contrast medium above this, HU: liver and spleen reach 120 in their venous phase.
+const LEAST_HU: i16 = 130;
 
 /// Blood is so even, HU, or so many standard deviations of its noise.
 const EVEN_HU: f64 = 70.0;
@@ -49,6 +57,46 @@ pub(super) fn find(
     dense: &Mask,
     bounds: &IndexBox,
 ) -> Result<Mask, ImagingError> {
+    let mut blood = between_lungs(scan, body, lungs, dense, bounds, i16::MIN)?;
+    let mut dense = Cow::Borrowed(dense);
+    if blood.is_empty() {
+        // As dense as where bone begins: half of its voxels are below that by noise.
+        let faint = scan.denser(&body.mask.cropped(bounds), bounds, FAINT_HU);
+        blood = between_lungs(scan, body, lungs, &faint, bounds, LEAST_HU)?;
+        dense.to_mut().unite(&blood);
+    }
+    if blood.is_empty() {
+        return Ok(blood);
+    }
+    scan.check()?;
+    // Bone is what is clearly denser than any blood, and what does not touch it.
+    let parts = Components::of(&dense, Connectivity::Faces);
+    let mut touched = vec![false; parts.parts().len()];
+    for voxel in blood.voxels() {
+        if let Some(part) = parts.part_at(voxel) {
+            touched[part] = true;
+        }
+    }
+    let with_blood = parts.mask_of(|part| touched[part]);
+    let brightest = brightest_of(scan, &blood, bounds);
+    let mut bone = scan.within(&with_blood, bounds, |hu| hu > brightest);
+    bone.subtract(&blood);
+    let mut halves = [blood, bone];
+    grow_back(scan, &mut halves, &with_blood)?;
+    let [blood, _] = halves;
+    Ok(blood)
+}
+
+/// Pools between the lungs, of what is dense; empty where they are too small together, or less dense than blood with
+/// contrast medium.
+fn between_lungs(
+    scan: &Scan<'_>,
+    body: &Body,
+    lungs: &Lungs,
+    dense: &Mask,
+    bounds: &IndexBox,
+    least_hu: i16,
+) -> Result<Mask, ImagingError> {
     let none = Mask::empty(dense.size());
     let Some(around) = lungs.around() else {
         return Ok(none);
@@ -72,7 +120,7 @@ pub(super) fn find(
             scan.check()?;
             let mut seed = none.clone();
             seed.unite_within(&around, &core.mask_of(|part| part == number));
-            let Some(middle) = scan.median(&seed, bounds) else {
+            let Some(middle) = scan.median(&seed, bounds).filter(|&hu| hu >= least_hu) else {
                 continue;
             };
             let is_as_dense =
@@ -91,26 +139,7 @@ pub(super) fn find(
             }
         }
     }
-    if blood.count() < pool {
-        return Ok(none);
-    }
-    scan.check()?;
-    // Bone is what is clearly denser than any blood, and what does not touch it.
-    let parts = Components::of(dense, Connectivity::Faces);
-    let mut touched = vec![false; parts.parts().len()];
-    for voxel in blood.voxels() {
-        if let Some(part) = parts.part_at(voxel) {
-            touched[part] = true;
-        }
-    }
-    let with_blood = parts.mask_of(|part| touched[part]);
-    let brightest = brightest_of(scan, &blood, bounds);
-    let mut bone = scan.within(&with_blood, bounds, |hu| hu > brightest);
-    bone.subtract(&blood);
-    let mut halves = [blood, bone];
-    grow_back(scan, &mut halves, &with_blood)?;
-    let [blood, _] = halves;
-    Ok(blood)
+    Ok(if blood.count() < pool { none } else { blood })
 }
 
 /// The pools of blood about a core of this median: even, in their place, and not enclosed in a shell.
