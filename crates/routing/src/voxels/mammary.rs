@@ -14,6 +14,9 @@ const HALF_STERNUM_M: f64 = 30e-3;
 /// Slices farther than this from the last one with a sternum are above or below it, m.
 const BESIDE_SLICES_M: f64 = 15e-3;
 
+/// The sternum's edges are those of its widest part within so much above and below, m (assumed).
+const STRAIGHT_M: f64 = 40e-3;
+
 /// A sternum lies within this behind the skin, m (assumed), also where no lung is seen behind it.
 const BEHIND_SKIN_M: f64 = 70e-3;
 
@@ -42,8 +45,8 @@ struct Sternum {
 
 /// Voxels of a box where internal mammary vessels are modelled.
 ///
-/// Rows run to the back, columns to the left. In each slice they lie from `FROM_EDGE_M` to `width_m` beside both edges of
-/// the sternum, and up to `DEEP_M` in front of lung and mediastinum, or behind the sternum where neither is near. The
+/// Rows run to the back, columns to the left. In each slice they lie from `FROM_EDGE_M` beside both edges of the sternum
+/// to `width_m` beside those of its widest part near it, and up to `DEEP_M` in front of lung and mediastinum, or behind the sternum where neither is near. The
 /// sternum is looked for about the `middle` column, or everywhere without one.
 pub(super) fn beside_sternum(
     within: &IndexBox,
@@ -82,6 +85,7 @@ pub(super) fn beside_sternum(
         })
         .collect();
     let reach = super::steps(BESIDE_SLICES_M / spacing_m[2]);
+    let straight = super::steps(STRAIGHT_M / spacing_m[2]);
     let (near, far) = (across(FROM_EDGE_M), across(width_m));
     let mut found = Vec::new();
     for (slice, k) in (first[2]..=last[2]).enumerate() {
@@ -95,8 +99,16 @@ pub(super) fn beside_sternum(
             continue;
         };
         let [low, high] = sternum.columns;
-        let right = low.saturating_sub(far)..low.saturating_sub(near);
-        let left = high + near + 1..=high + far;
+        // They run straight on where the sternum becomes narrow.
+        let wide = sterna
+            .iter()
+            .enumerate()
+            .filter_map(|(other, sternum)| sternum.filter(|_| other.abs_diff(slice) <= straight));
+        let [widest_low, widest_high] = wide.fold([low, high], |[a, b], sternum| {
+            [a.min(sternum.columns[0]), b.max(sternum.columns[1])]
+        });
+        let right = widest_low.saturating_sub(far)..low.saturating_sub(near);
+        let left = high + near + 1..=widest_high + far;
         let columns = right.chain(left);
         for i in columns.filter(|i| (first[0]..=last[0]).contains(i)) {
             let inner = front(i, k).filter(|&front| front <= sternum.back + far_behind);

@@ -237,6 +237,12 @@ impl VoxelAnatomy {
                 let most = (0..=u8::MAX).max_by_key(|&lung| (lungs[usize::from(lung)], lung));
                 self.target_lung = most.filter(|&lung| lungs[usize::from(lung)] > 0);
                 self.touches_pleura = self.target_lung.map(|_| false);
+                if self.classes.get(class).mark == Mark::LungVessel {
+                    self.remarks.push(Remark::new(
+                        "the target is in what is taken for a vessel of the lung, which needle paths avoid: a nodule \
+                         there is one only as a lesion (`ct build --lesion`, or a label map)",
+                    ));
+                }
             }
             Kind::Lesion => {
                 let (mut faces, mut soft, mut lungs) = (0_usize, 0_usize, [0_usize; 256]);

@@ -544,6 +544,16 @@ fn beside_the_sternum_are_vessels_that_no_scan_shows() {
     assert!((6.0..=10.0).contains(&beyond_mm), "{beyond_mm}");
     let at_midline_mm = distance_mm([46.0, 44.0]);
     assert!((4.0..=12.0).contains(&at_midline_mm), "{at_midline_mm}");
+    // Where it is narrow they run straight on.
+    for (k, j) in (4..7).flat_map(|k| (4..8).map(move |j| (k, j))) {
+        for i in (40..44).chain(46..58) {
+            labels.labels[grid.offset([i, j, k])] = SOFT;
+        }
+    }
+    for columns in [[60.0, 58.0], [32.0, 30.0]] {
+        let found = nearest_across(&labels, columns, 8.5, Obstacle::Vessel).unwrap();
+        assert!(found.distance_m <= 0.0, "{columns:?}");
+    }
 }
 
 #[test]
