@@ -6,6 +6,8 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_geometry::TriangleMesh;
 
 use crate::grid::VoxelGrid;
+use crate::mask::Mask;
+use crate::spacing::whole;
 use crate::volume::{AIR_HU, Volume};
 
 /// Slices that are looked at for padding.
@@ -39,13 +41,21 @@ const FINE: f64 = 60.0;
 /// Share of what is on that circle that is tissue where it was cut: skin that is blurred by half a pixel has half.
 const IS_CUT: f64 = 0.9;
 
+/// The same where all of the rim but this is on the circle, as where a couch or a lung is cut, too.
+const IS_CUT_ALL_ROUND: f64 = 0.7;
+const ALL_ROUND: f64 = 0.9;
+
 /// Steps towards the circle around a rim: its radius to 1 %, mostly to 0.1 %.
 const CIRCLE_STEPS: usize = 10_000;
 
 /// Skin so near to a side may be the cut itself, pixels.
 const RIM_PIXELS: f64 = 1.5;
 
-/// Skin so near to the centres of the first and last slice is not told from the cut, m (assumed).
+/// Voxels whose centres are farther outside than this were not seen, pixels.
+const UNSEEN_PIXELS: f64 = 0.25;
+
+/// Skin so near to the centres of the first and last slice, or to a side that cuts it, is not told from the cut, m
+/// (assumed).
 const END_M: f64 = 5e-3;
 
 /// A plane beyond which skin was not seen, in `ct`.
@@ -117,6 +127,38 @@ impl FieldOfView {
             .min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
+    /// Voxels of a grid outside a round field of view; none if all within the image was seen.
+    pub(crate) fn unseen(&self, grid: &VoxelGrid) -> Option<Mask> {
+        if self.sides.len() < SIDES {
+            return None;
+        }
+        let [nx, ny, nz] = grid.size();
+        let step = grid.steps_m().column(0).into_owned();
+        let rim_m = UNSEEN_PIXELS * self.pixel_m;
+        let mut seen = Mask::empty([nx, ny, nz]);
+        for (j, k) in (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k))) {
+            let first = grid.ct_from_index(&Point3::new(0.0, j as f64, k as f64));
+            // A convex region: in a row, from one column to another.
+            let (mut from, mut to) = (0.0, (nx - 1) as f64);
+            for side in &self.sides {
+                let depth_m = side.depth_m(&first) + rim_m;
+                let per_column_m = side.normal.dot(&step);
+                if per_column_m > 0.0 {
+                    to = f64::min(to, depth_m / per_column_m);
+                } else if per_column_m < 0.0 {
+                    from = f64::max(from, depth_m / per_column_m);
+                } else if depth_m < 0.0 {
+                    to = -1.0;
+                }
+            }
+            let [from, to] = [from.ceil(), to.floor() + 1.0];
+            if from < to {
+                seen.insert_run([from, to].map(whole), j, k);
+            }
+        }
+        Some(seen.complement())
+    }
+
     /// Skin so near to a side may be the cut itself, m.
     pub(crate) fn rim_m(&self) -> f64 {
         RIM_PIXELS * self.pixel_m
@@ -128,11 +170,12 @@ impl FieldOfView {
             offset_m: cut.offset_m - by_m,
             ..*cut
         };
-        let reaches = |cut: &Cut| skin.vertices_m.iter().any(|at| cut.depth_m(at) < 0.0);
+        let rim_m = self.rim_m();
+        let reaches = |cut: &&Cut| skin.vertices_m.iter().any(|at| cut.depth_m(at) < rim_m);
         let ends = self.ends.iter().map(|end| inset(end, END_M));
-        let sides = self.sides.iter();
-        let sides = sides.map(|side| inset(side, self.rim_m()));
-        ends.chain(sides.filter(reaches)).collect()
+        let sides = self.sides.iter().filter(reaches);
+        let sides = sides.map(|side| inset(side, rim_m.max(END_M)));
+        ends.chain(sides).collect()
     }
 }
 
@@ -311,8 +354,13 @@ impl Outline {
         } else {
             coarse
         };
-        f64::from(on_circle) >= is_round * rim.len() as f64
-            && cut as f64 >= IS_CUT * f64::from(on_circle)
+        let share_on_circle = f64::from(on_circle) / rim.len() as f64;
+        let is_cut = if share_on_circle >= ALL_ROUND {
+            IS_CUT_ALL_ROUND
+        } else {
+            IS_CUT
+        };
+        share_on_circle >= is_round && cut as f64 >= is_cut * f64::from(on_circle)
     }
 
     /// Pixels with a value beside one without.

@@ -1,11 +1,13 @@
 //! A label map from elsewhere, by which what was found in the volume is completed.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
 use crate::components::{Components, Connectivity};
 use crate::error::{ImagingError, Remark};
+use crate::field_of_view::FieldOfView;
 use crate::grid::VoxelGrid;
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::dilated;
@@ -21,6 +23,44 @@ pub(crate) struct Given {
     pub structure: Structure,
     pub bounds: IndexBox,
     pub mask: Mask,
+}
+
+/// A label map within a field of view: what was drawn beyond it, as of another series or by a program that completes
+/// bodies, has neither skin around it nor values under it.
+pub(crate) fn seen_labels<'a>(
+    map: &'a LabelMap,
+    grid: &VoxelGrid,
+    seen: &FieldOfView,
+    remarks: &mut Vec<Remark>,
+) -> Result<Cow<'a, LabelMap>, ImagingError> {
+    check_same_grid(&map.grid, grid)?;
+    let Some(unseen) = seen.unseen(grid) else {
+        return Ok(Cow::Borrowed(map));
+    };
+    let mut counts: BTreeMap<u16, usize> = BTreeMap::new();
+    let mut within = map.clone();
+    for voxel in unseen.voxels() {
+        let label = &mut within.labels[grid.offset(voxel)];
+        if *label != 0 {
+            *counts.entry(*label).or_default() += 1;
+            *label = 0;
+        }
+    }
+    let known = map.names.iter().filter_map(|(label, name)| {
+        structure_of(name)?;
+        let ml = 1e6 * *counts.get(label)? as f64 * grid.steps_m().determinant().abs();
+        Some(format!("`{name}` {ml:.1} ml"))
+    });
+    let known: Vec<String> = known.collect();
+    if known.is_empty() {
+        return Ok(Cow::Borrowed(map));
+    }
+    let words = format!(
+        "beyond the field of view, where the scan shows nothing, it is left out: {}",
+        known.join(", ")
+    );
+    remarks.push(Remark::new(words).at("label map"));
+    Ok(Cow::Owned(within))
 }
 
 /// Structures that a label map names, each with all its labels.

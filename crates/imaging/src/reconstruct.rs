@@ -15,12 +15,13 @@ use crate::error::{ImagingError, Remark};
 use crate::field_of_view::FieldOfView;
 use crate::grid::VoxelGrid;
 use crate::label_map::{
-    Given, complete, completed_labels, fill_outside, given_structures, is_solid,
+    Given, complete, completed_labels, fill_outside, given_structures, is_solid, seen_labels,
 };
 use crate::mapped_lesions::mapped_lesions;
 use crate::mask::{IndexBox, Mask};
+use crate::read::Lying;
 use crate::segment::{
-    Label, LabelFacts, Lesion, LesionSeed, Levels, SOFT_FROM_HU, Segmentation,
+    BesideKind, Label, LabelFacts, Lesion, LesionSeed, Levels, SOFT_FROM_HU, Segmentation,
     centre_covariance_m2, check_complete, grow_lesion, label_map, segment,
 };
 use crate::spacing::{orthogonal, whole};
@@ -44,6 +45,8 @@ pub struct ReconstructOptions {
     pub levels: Levels,
     /// What the scan has seen; what the volume shows of it if left out.
     pub field_of_view: Option<FieldOfView>,
+    /// On what the patient lies; on the back if left out.
+    pub lying: Option<Lying>,
 }
 
 /// Triangles that surfaces are reduced to, as long as they stay near the voxels.
@@ -206,9 +209,14 @@ pub fn reconstruct(
     progress("tissues", 0.0);
     let seen = options.field_of_view.clone();
     let seen = seen.unwrap_or_else(|| FieldOfView::of(volume));
-    let mut found = segment(volume, &seen, &options.levels, cancel)?;
+    let lying = options.lying.unwrap_or(Lying::Supine);
+    let mut found = segment(volume, &seen, lying, &options.levels, cancel)?;
     let mut remarks = std::mem::take(&mut found.remarks);
-    let mut given = match &options.labels {
+    let map = options.labels.as_ref();
+    let map = map
+        .map(|map| seen_labels(map, &volume.grid, &seen, &mut remarks))
+        .transpose()?;
+    let mut given = match &map {
         Some(map) => given_structures(map, &volume.grid, &mut remarks)?,
         None => Vec::new(),
     };
@@ -238,7 +246,7 @@ pub fn reconstruct(
     let (mut surfaces, sizes) = sort(made, &jobs, lesions.len(), &mut remarks);
     keep_within_skin(&mut surfaces, &mut remarks);
     progress("label map", 0.95);
-    let (labels, facts) = match &options.labels {
+    let (labels, facts) = match &map {
         Some(given) => completed_labels(volume, &found, &lesions, given),
         None => label_map(volume, &found, &lesions),
     };
@@ -397,9 +405,12 @@ fn jobs<'a>(
         SMALL_CELL_M,
     );
     for each in &found.beside {
-        let runs = Runs::At {
-            level_hu: levels.skin_hu,
-            typical: [SOFT, AIR],
+        let runs = match each.kind {
+            BesideKind::AssumedCouch => Runs::Mask,
+            _ => Runs::At {
+                level_hu: levels.skin_hu,
+                typical: [SOFT, AIR],
+            },
         };
         add(
             each.kind.name(),

@@ -229,6 +229,10 @@ pub(super) fn see(
         labels,
         sizes: options.sizes,
         field_of_view: Some(field_of_view.clone()),
+        lying: read
+            .description
+            .patient_position
+            .map(|position| position.lying),
         ..ReconstructOptions::default()
     };
     let step = |what: &str, share: f64| {

@@ -190,7 +190,7 @@ impl ScanBuild {
         rows.extend(of_surfaces(&is_within));
         let labels = made.facts.iter();
         rows.extend(labels.filter_map(|fact| self.of_label(fact)));
-        let beside = of_surfaces(&|tissue| tissue == SurfaceTissue::Beside);
+        let mut beside = of_surfaces(&|tissue| tissue == SurfaceTissue::Beside);
         let of_name = |name: &str| rows.iter().any(|row| row.name == name);
         let mut more: Vec<OverviewRow> = EXPECTED
             .iter()
@@ -222,7 +222,15 @@ impl ScanBuild {
                 "not segmented",
             )
         }));
+        for row in &mut beside {
+            if row.name == BesideKind::AssumedCouch.name() {
+                row.source = OverviewSource::Assumed;
+                row.accuracy = None;
+                row.unknown = Some("beyond the field of view".to_owned());
+            }
+        }
         let absent = BesideKind::ALL.into_iter().map(BesideKind::name);
+        let absent = absent.filter(|name| *name != BesideKind::AssumedCouch.name());
         let absent = absent.filter(|name| !beside.iter().any(|row| row.name == *name));
         let absent: Vec<&str> = absent.collect();
         rows.extend(beside);

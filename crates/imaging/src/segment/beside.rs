@@ -6,10 +6,11 @@ use crate::components::{Component, Components, Connectivity};
 use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::dilated;
+use crate::read::Lying;
 use crate::spacing::whole;
 
-use super::Scan;
 use super::body::Body;
+use super::{Scan, couch};
 
 /// Shells of couches and cushions are denser than this even where thick slices blur them; air with noise is not, HU.
 const SHELL_HU: i16 = -700;
@@ -59,11 +60,13 @@ pub enum BesideKind {
     Couch,
     /// Anything else: cushions, rails, tubes, cables.
     Objects,
+    /// Where the couch is taken to be beyond a field of view that does not show all of it.
+    AssumedCouch,
 }
 
 impl BesideKind {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Arms, Self::Couch, Self::Objects];
+    pub const ALL: [Self; 4] = [Self::Arms, Self::Couch, Self::Objects, Self::AssumedCouch];
 
     /// Its name in label maps, and of its surface.
     pub fn name(self) -> &'static str {
@@ -71,6 +74,7 @@ impl BesideKind {
             Self::Arms => "arms",
             Self::Couch => "couch",
             Self::Objects => "objects",
+            Self::AssumedCouch => "assumed_couch",
         }
     }
 }
@@ -90,6 +94,8 @@ pub struct Beside {
 pub(super) fn find(
     scan: &Scan<'_>,
     body: &Body,
+    unseen: Option<&Mask>,
+    lying: Lying,
     remarks: &mut Vec<Remark>,
 ) -> Result<Vec<Beside>, ImagingError> {
     let mut dense = Mask::of(scan.size(), &scan.volume.hu, |hu| hu > SHELL_HU);
@@ -124,10 +130,24 @@ pub(super) fn find(
             part.voxels >= least && kind(scan, part) == wanted
         })
     };
+    let couch = of_others(BesideKind::Couch);
+    let assumed = unseen.map_or_else(
+        || Mask::empty(scan.size()),
+        |unseen| {
+            couch::beyond(
+                scan,
+                unseen,
+                lying,
+                body,
+                Some(&couch).filter(|it| !it.is_empty()),
+            )
+        },
+    );
     let found = [
         (BesideKind::Arms, arms),
-        (BesideKind::Couch, of_others(BesideKind::Couch)),
+        (BesideKind::Couch, couch),
         (BesideKind::Objects, of_others(BesideKind::Objects)),
+        (BesideKind::AssumedCouch, assumed),
     ];
     let found = found.into_iter().filter_map(|(kind, mask)| {
         let bounds = mask.bounds()?;
@@ -212,6 +232,9 @@ fn in_words(scan: &Scan<'_>, found: &Beside) -> Remark {
         BesideKind::Arms => "soft tissue with bone apart from the body: arms",
         BesideKind::Couch => "as wide as a couch, through the scan",
         BesideKind::Objects => "neither arm nor couch: cushion, rail, tube?",
+        BesideKind::AssumedCouch => {
+            "couch assumed beyond the field of view, where nothing was seen"
+        }
     };
     let litres = scan.litres(found.mask.count());
     let [low, high] = [found.bounds.first, found.bounds.last].map(|corner| {

@@ -29,6 +29,9 @@ const OUTSIDE_HU: f64 = -940.0;
 /// Air at the border of the volume that may be a lung which the field of view cuts.
 const CUT_LUNG_L: f64 = 0.05;
 
+/// Share of a lung that has a chest wall in front of it and behind it; under a body, and beside it, is one at most.
+const WITHIN_WALLS: f64 = 0.5;
+
 /// Voxels so near to a side of the field of view end there, pixels.
 const RIM_PIXELS: f64 = 0.75;
 
@@ -54,6 +57,7 @@ pub struct Body {
 pub(super) fn find(
     scan: &Scan<'_>,
     seen: &FieldOfView,
+    unseen: Option<&Mask>,
     remarks: &mut Vec<Remark>,
 ) -> Result<Body, ImagingError> {
     let level = below(scan.levels.skin_hu);
@@ -62,7 +66,7 @@ pub(super) fn find(
     scan.check()?;
     let solid = without_bed(scan, &tissue, remarks)?;
     scan.check()?;
-    let mask = filled(scan, &solid, remarks);
+    let mask = filled(scan, &solid, unseen, remarks);
     let Some(bounds) = mask.bounds() else {
         return Err(nothing_there());
     };
@@ -182,32 +186,45 @@ fn without_bed(
 }
 
 /// With all that it encloses.
-fn filled(scan: &Scan<'_>, solid: &Mask, remarks: &mut Vec<Remark>) -> Mask {
-    let around = Components::of(&solid.complement(), Connectivity::Faces);
+fn filled(scan: &Scan<'_>, solid: &Mask, unseen: Option<&Mask>, remarks: &mut Vec<Remark>) -> Mask {
+    // What was not seen is air in all of the image, and would join a lung that it cuts to the air around the body.
+    let mut open = solid.complement();
+    if let Some(unseen) = unseen {
+        open.subtract(unseen);
+    }
     let [nx, ny, _] = scan.size();
+    let around = Components::of(&open, Connectivity::Faces);
+    let at_rim = unseen.map_or_else(Vec::new, |unseen| parts_beside(&around, unseen));
     let touches_side = |bounds: &IndexBox| {
         bounds.first[0] == 0
             || bounds.first[1] == 0
             || bounds.last[0] == nx - 1
             || bounds.last[1] == ny - 1
     };
-    let mut sums = vec![(0.0, 0.0); around.parts().len()];
+    let walls = walls(solid);
+    let mut sums = vec![(0.0, 0.0, 0.0); around.parts().len()];
     for (part, [from, to], j, k) in around.runs() {
         // The middle of a run stands for it: noise averages out over all runs.
         let length = (to - from) as f64;
-        let hu = scan.hu([from.midpoint(to - 1), j, k]);
-        sums[part].0 += length * f64::from(hu);
+        let middle = from.midpoint(to - 1);
+        sums[part].0 += length * f64::from(scan.hu([middle, j, k]));
         sums[part].1 += length;
+        let [front, back] = walls[k * nx + middle];
+        if (front..back).contains(&j) {
+            sums[part].2 += length;
+        }
     }
     let largest = around.largest();
+    let share = |part: usize, sum: f64| sum / f64::max(sums[part].1, 1.0);
     let is_outside: Vec<bool> = around
         .parts()
         .iter()
         .enumerate()
         .map(|(part, each)| {
-            let at_side = touches_side(&each.bounds);
-            let lung_like = Some(part) != largest
-                && sums[part].0 / sums[part].1 > OUTSIDE_HU
+            let at_side = touches_side(&each.bounds) || at_rim.get(part) == Some(&true);
+            let lung_like = (Some(part) != largest || unseen.is_some())
+                && share(part, sums[part].0) > OUTSIDE_HU
+                && share(part, sums[part].2) > WITHIN_WALLS
                 && scan.litres(each.voxels) > CUT_LUNG_L;
             if at_side && lung_like {
                 remarks.push(Remark::new(format!(
@@ -219,10 +236,50 @@ fn filled(scan: &Scan<'_>, solid: &Mask, remarks: &mut Vec<Remark>) -> Mask {
             at_side && !lung_like
         })
         .collect();
-    let body = around.mask_of(|part| is_outside[part]).complement();
+    let mut outside = around.mask_of(|part| is_outside[part]);
+    if let Some(unseen) = unseen {
+        outside.unite(unseen);
+    }
+    outside.subtract(solid);
+    let body = outside.complement();
     let parts = Components::of(&body, Connectivity::Faces);
     let largest = parts.largest();
     parts.mask_of(|part| Some(part) == largest)
+}
+
+/// The first and the last voxel of a mask along the second axis, for each column of each slice.
+fn walls(mask: &Mask) -> Vec<[usize; 2]> {
+    let [nx, ny, nz] = mask.size();
+    let mut found = vec![[ny, 0]; nx * nz];
+    for (j, k) in (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k))) {
+        for [from, to] in mask.runs(j, k) {
+            for [first, last] in &mut found[k * nx + from..k * nx + to] {
+                *first = (*first).min(j);
+                *last = j;
+            }
+        }
+    }
+    found
+}
+
+/// Which parts touch a mask within their slices.
+fn parts_beside(parts: &Components, mask: &Mask) -> Vec<bool> {
+    let mut found = vec![false; parts.parts().len()];
+    let [nx, ny, _] = mask.size();
+    for (part, [from, to], j, k) in parts.runs() {
+        if found[part] {
+            continue;
+        }
+        let ends = [from.checked_sub(1), Some(to).filter(|&i| i < nx)];
+        let above = [j.checked_sub(1), Some(j + 1).filter(|&j| j < ny)];
+        let at_end = ends.into_iter().flatten().any(|i| mask.get([i, j, k]));
+        found[part] = at_end
+            || above
+                .into_iter()
+                .flatten()
+                .any(|j| (from..to).any(|i| mask.get([i, j, k])));
+    }
+    found
 }
 
 /// Area of the faces between two masks that do not overlap, other than along k, m^2.

@@ -38,6 +38,8 @@ pub enum Label {
     Cartilage = 12,
     /// Air in the place of the lungs that has no lung around it: bullae, emphysema, a pneumothorax.
     NoLung = 13,
+    /// The couch beyond the field of view, assumed.
+    AssumedCouch = 14,
 }
 
 /// Label of the first lesion; the others follow in their order.
@@ -45,7 +47,7 @@ pub const FIRST_LESION: u16 = 100;
 
 impl Label {
     /// All of them.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::SoftTissue,
         Self::LungLeft,
         Self::LungRight,
@@ -59,6 +61,7 @@ impl Label {
         Self::Objects,
         Self::Cartilage,
         Self::NoLung,
+        Self::AssumedCouch,
     ];
 
     /// Its name in label maps and reports.
@@ -77,6 +80,7 @@ impl Label {
             Self::Objects => BesideKind::Objects.name(),
             Self::Cartilage => "costal_cartilages",
             Self::NoLung => "air_without_lung",
+            Self::AssumedCouch => BesideKind::AssumedCouch.name(),
         }
     }
 }
@@ -114,6 +118,7 @@ pub fn label_map(
             BesideKind::Arms => Label::Arms,
             BesideKind::Couch => Label::Couch,
             BesideKind::Objects => Label::Objects,
+            BesideKind::AssumedCouch => Label::AssumedCouch,
         };
         paint(&mut map, &each.bounds, &each.mask, label as u16);
     }

@@ -5,6 +5,7 @@ mod blood;
 mod body;
 mod bone;
 mod cartilage;
+mod couch;
 mod labels;
 mod lesion;
 mod lungs;
@@ -16,6 +17,7 @@ use crate::error::{ImagingError, Remark};
 use crate::field_of_view::FieldOfView;
 use crate::mask::{IndexBox, Mask};
 use crate::orientation::Orientation;
+use crate::read::Lying;
 use crate::spacing::{orthogonal, whole};
 use crate::volume::Volume;
 
@@ -117,13 +119,14 @@ impl Levels {
     }
 }
 
-/// Finds body, lungs, airways, vessels and bone in what a scan has `seen`.
+/// Finds body, lungs, airways, vessels and bone in what a scan has `seen` of a patient, lying on back, front or side.
 ///
 /// # Errors
 /// If the grid is sheared or its slices do not run along the patient, nothing is denser than air, or it was told to stop.
 pub fn segment(
     volume: &Volume,
     seen: &FieldOfView,
+    lying: Lying,
     levels: &Levels,
     cancel: &AtomicBool,
 ) -> Result<Segmentation, ImagingError> {
@@ -135,8 +138,9 @@ pub fn segment(
         cancel,
     };
     let mut remarks = Vec::new();
-    let body = body::find(&scan, seen, &mut remarks)?;
-    let beside = beside::find(&scan, &body, &mut remarks)?;
+    let unseen = seen.unseen(&volume.grid);
+    let body = body::find(&scan, seen, unseen.as_ref(), &mut remarks)?;
+    let beside = beside::find(&scan, &body, unseen.as_ref(), lying, &mut remarks)?;
     let lungs = lungs::find(&scan, &body, &mut remarks)?;
     let bone = bone::find(&scan, &body, &lungs, &mut remarks)?;
     upright::check(&scan, &body, &lungs, &bone)?;

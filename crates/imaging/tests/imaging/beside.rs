@@ -37,7 +37,7 @@ fn alone() -> Vec<Solid> {
     chest().into_iter().skip(1).collect()
 }
 
-fn in_the_scanner() -> Vec<Solid> {
+pub(super) fn in_the_scanner() -> Vec<Solid> {
     let [upper, lower] = SHELLS_MM;
     let mut solids = vec![
         slab([upper[0], lower[1]], -960.0),

@@ -7,3 +7,4 @@ mod nodules;
 mod outside;
 mod readers;
 mod reconstruct;
+mod round_view;
