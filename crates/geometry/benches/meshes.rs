@@ -1,11 +1,14 @@
-//! A convex piece and a segment against a surface, beside parry on the same geometry.
+//! A convex piece and a segment against a surface, beside parry on the same geometry; and what a surface takes that is
+//! met for the first time.
 //!
-//! `cargo bench -p needlebench-clearance --bench meshes`
+//! `cargo bench -p needlebench-geometry --bench meshes`
 
 use std::hint::black_box;
 use std::time::Instant;
 
 use nalgebra::{Point3, Vector3};
+use needlebench_geometry::mesh::{Fidelity, SurfaceIndex, convex_hull, decompose};
+use needlebench_geometry::sample_solids::torus;
 use needlebench_geometry::{PreparedShape, Shape, TriangleMesh, separation};
 use needlebench_kinematics::Pose;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector};
@@ -237,7 +240,41 @@ fn plot(rows: &[(f64, [f64; 2])]) -> String {
     svg.concat()
 }
 
+/// What an obstacle takes that no cache knows: the hull, which tells whether it is convex, the pieces, and how far they
+/// are from it.
+fn cold() {
+    println!(
+        "\n{:8} {:>10} {:>10} {:>10} {:>13} {:>8} {:>15}",
+        "", "triangles", "hull, s", "pieces, s", "fidelity, s", "pieces", "uncovered, um"
+    );
+    let seconds = |start: Instant| start.elapsed().as_secs_f64();
+    let chests = [7, 32, 100].map(|cuts| ("chest", chest(cuts)));
+    let rings =
+        [[40, 12], [160, 62], [500, 200]].map(|[around, about]| ("ring", torus(around, about)));
+    for (name, surface) in chests.into_iter().chain(rings) {
+        let count = surface.triangles.len();
+        let start = Instant::now();
+        black_box(convex_hull(&surface.vertices_m).expect("a volume"));
+        let hull_s = seconds(start);
+        let solid = SurfaceIndex::new(surface);
+        // Its tree is made at the first question.
+        black_box(solid.contains(&Point3::origin()));
+        let start = Instant::now();
+        let pieces = decompose(&solid);
+        let pieces_s = seconds(start);
+        let start = Instant::now();
+        let found = Fidelity::measure(&solid, &pieces);
+        let fidelity_s = seconds(start);
+        println!(
+            "{name:8} {count:10} {hull_s:10.3} {pieces_s:10.3} {fidelity_s:13.3} {:8} {:15.1}",
+            found.pieces,
+            found.uncovered_m * 1e6
+        );
+    }
+}
+
 fn main() {
     beside_parry();
     scaling();
+    cold();
 }

@@ -219,14 +219,17 @@ impl Part {
 /// Largest distance of a sample of a piece from the solid, m, and the solid's nearest point.
 fn overhang(piece: &ConvexMesh, solid: &SurfaceIndex, samples: f64) -> (f64, Point3<f64>) {
     let spacing_m = (area_m2(&piece.0) / samples).sqrt();
-    points_on(&piece.0, spacing_m)
-        .filter(|point| !solid.contains(point))
-        .map(|point| {
-            let nearest = solid.nearest(&point);
-            ((nearest - point).norm(), nearest)
-        })
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .unwrap_or((0.0, Point3::origin()))
+    let mut worst = None;
+    for point in points_on(&piece.0, spacing_m) {
+        let nearest = solid.nearest(&point);
+        let distance_m = (nearest - point).norm();
+        // Whether it is inside takes longer to find out, and does not matter of most.
+        let is_farther = worst.is_none_or(|(worst_m, _)| distance_m >= worst_m);
+        if is_farther && !solid.contains(&point) {
+            worst = Some((distance_m, nearest));
+        }
+    }
+    worst.unwrap_or((0.0, Point3::origin()))
 }
 
 /// About the hulls of what lies on either side of a plane.

@@ -13,14 +13,16 @@ const SAME_PLANE: f64 = 1e-9;
 /// Cosine of the angle between two faces above which the smaller share stands for what both leave: 30 degrees.
 const SMOOTH_COSINE: f64 = 0.866;
 
+/// Times the reach of a box: further from a surface there is no doubt about it, whatever rounding does.
+const CLEARLY: f64 = 1.0 + 1e-6;
+
 /// A solid in the frame of the slices.
 #[derive(Debug)]
 pub(crate) enum Body {
     /// Points within `radius_m` of a segment; a ball has no axis.
     Round {
         centre: Vector3<f64>,
-        /// From the centre to the segment's end.
-        half_axis: Vector3<f64>,
+        segment: Segment,
         radius_m: f64,
     },
     /// A cylinder with flat ends.
@@ -38,6 +40,16 @@ pub(crate) enum Body {
         centre: Vector3<f64>,
         shape_from_frame: UnitQuaternion<f64>,
     },
+}
+
+/// A segment about the origin.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Segment {
+    /// From its middle to its end.
+    half_axis: Vector3<f64>,
+    squared: f64,
+    /// Unit vector along it.
+    along: Vector3<f64>,
 }
 
 /// How a box lies to a body.
@@ -86,7 +98,7 @@ impl Body {
         match &solid.shape {
             Shape::Sphere { radius_m } => Self::Round {
                 centre,
-                half_axis: Vector3::zeros(),
+                segment: Segment::new(Vector3::zeros()),
                 radius_m: *radius_m,
             },
             Shape::Capsule {
@@ -94,7 +106,7 @@ impl Body {
                 half_length_m,
             } => Self::Round {
                 centre,
-                half_axis: axis * *half_length_m,
+                segment: Segment::new(axis * *half_length_m),
                 radius_m: *radius_m,
             },
             Shape::Cylinder {
@@ -167,10 +179,10 @@ impl Body {
         match self {
             Self::Round {
                 centre,
-                half_axis,
+                segment,
                 radius_m,
             } => {
-                let (from_axis, along) = from_segment(&(cell.centre - centre), half_axis);
+                let (from_axis, along) = segment.to(&(cell.centre - centre));
                 fills_round(cell, &from_axis, along, *radius_m)
             }
             Self::Drum {
@@ -228,6 +240,42 @@ impl Body {
         }
     }
 
+    /// How a small box lies to a round body where the distance of its centre alone tells: there [`Self::fills`] has
+    /// a share of 0 or 1, and nothing is rough.
+    #[inline]
+    pub fn clearly_lies(&self, cell: &Cell) -> Lies {
+        let reach_m = cell.half.norm();
+        match self {
+            Self::Round {
+                centre,
+                segment,
+                radius_m,
+            } => {
+                let (from_axis, _) = segment.to(&(cell.centre - centre));
+                clearly_within(from_axis.norm_squared(), *radius_m, reach_m)
+            }
+            Self::Drum {
+                centre,
+                axis,
+                radius_m,
+                half_length_m,
+            } => {
+                let from_centre = cell.centre - centre;
+                let along_m = axis.dot(&from_centre);
+                let from_axis = from_centre - axis * along_m;
+                let over_end_m = along_m.abs() - half_length_m;
+                if over_end_m > CLEARLY * reach_m {
+                    return Lies::Outside;
+                }
+                match clearly_within(from_axis.norm_squared(), *radius_m, reach_m) {
+                    Lies::Inside if over_end_m >= -CLEARLY * reach_m => Lies::Across,
+                    side => side,
+                }
+            }
+            Self::Faces(_) | Self::Surface { .. } => Lies::Across,
+        }
+    }
+
     /// How much of a small box is inside a surface, taken as the plane across the way to its nearest point; rough where the
     /// surface is not one there.
     fn fills_surface(&self, cell: &Cell) -> Filled {
@@ -273,9 +321,9 @@ impl Body {
         match self {
             Self::Round {
                 centre,
-                half_axis,
+                segment,
                 radius_m,
-            } => from_segment(&(point - centre), half_axis).0.norm() - radius_m,
+            } => segment.to(&(point - centre)).0.norm() - radius_m,
             Self::Drum {
                 centre,
                 axis,
@@ -308,20 +356,42 @@ impl Body {
     }
 }
 
-/// From the nearest point of a segment about the origin; and the segment's direction, where that is not an end.
-#[inline]
-fn from_segment(
-    point: &Vector3<f64>,
-    half_axis: &Vector3<f64>,
-) -> (Vector3<f64>, Option<Vector3<f64>>) {
-    let squared = half_axis.norm_squared();
-    if squared == 0.0 {
-        return (*point, None);
+impl Segment {
+    fn new(half_axis: Vector3<f64>) -> Self {
+        let squared = half_axis.norm_squared();
+        Self {
+            half_axis,
+            squared,
+            along: half_axis / squared.sqrt(),
+        }
     }
-    let at = point.dot(half_axis) / squared;
-    let on_axis = half_axis * at.clamp(-1.0, 1.0);
-    let along = (at.abs() < 1.0).then(|| half_axis / squared.sqrt());
-    (point - on_axis, along)
+
+    /// From its nearest point to a point; and its direction, where that is not an end.
+    #[inline]
+    fn to(&self, point: &Vector3<f64>) -> (Vector3<f64>, Option<Vector3<f64>>) {
+        if self.squared == 0.0 {
+            return (*point, None);
+        }
+        let at = point.dot(&self.half_axis) / self.squared;
+        let on_axis = self.half_axis * at.clamp(-1.0, 1.0);
+        (point - on_axis, (at.abs() < 1.0).then_some(self.along))
+    }
+}
+
+/// How a small box lies to what is within a distance of an axis, by the square of its centre's distance.
+#[inline]
+fn clearly_within(squared_m2: f64, radius_m: f64, reach_m: f64) -> Lies {
+    /// The mean height of the round surface over the box is above the centre's by a sixth of the reach at most.
+    const CURVED: f64 = 7.0 / 6.0;
+    let outside_m = radius_m + CLEARLY * reach_m;
+    if squared_m2 > outside_m * outside_m {
+        return Lies::Outside;
+    }
+    let inside_m = radius_m - CLEARLY * CURVED * reach_m;
+    if radius_m > 2.0 * reach_m && squared_m2 < inside_m * inside_m {
+        return Lies::Inside;
+    }
+    Lies::Across
 }
 
 /// How much of a small box is within a distance of an axis, or of a point where there is no axis.
