@@ -18,8 +18,9 @@ const SEEN_WIDTH_M: f64 = 0.1;
 /// No couch is more hollow, m.
 const LEAST_RADIUS_M: f64 = 0.25;
 
-/// It is taken to be so thick, m (assumed).
+/// It is taken to be so thick, m (assumed): where it is seen in part, and where it may also be lower than the patient.
 const THICK_M: f64 = 0.03;
+const THICK_UNSEEN_M: f64 = 0.1;
 
 /// What a body lies on is seen if the field of view goes on so far below it, m.
 const BELOW_M: f64 = 0.05;
@@ -139,6 +140,7 @@ pub(super) fn beyond(
             (hollow, [middle, middle])
         }
     };
+    let thick_m = couch.map_or(THICK_UNSEEN_M, |_| THICK_M);
     let reach = whole(END_M / axes.steps_m[0]) + 1;
     let slices = 0..size[2];
     for column in 0..size[axes.across] {
@@ -159,7 +161,7 @@ pub(super) fn beyond(
         };
         let top_m = hollow.height_m(column as f64 * axes.steps_m[0]);
         let end_m = hollow.height_m(end as f64 * axes.steps_m[0]);
-        let rows = axes.indices([top_m - THICK_M, top_m], size[axes.upwards]);
+        let rows = axes.indices([top_m - thick_m, top_m], size[axes.upwards]);
         for k in slices.clone() {
             let at = |across: usize, upwards: usize| {
                 let mut voxel = [0, 0, k];

@@ -7,6 +7,7 @@ Nothing of the anatomy is taken from needlebench: ellipses, capsules and half-sp
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -101,7 +102,7 @@ class Drawing:
 
     def tube(self, tissue: str, name: str, points: list[tuple[float, float, float]], r: float, hu: float) -> None:
         """A chain of capsules."""
-        for a, b in zip(points, points[1:], strict=False):
+        for a, b in itertools.pairwise(points):
             self.add(tissue, name, capsule(a=a, b=b, r=r), hu, box(a, b, r + 4))
 
     def bony(self, name: str, distance: Distance, ends: tuple[tuple[float, ...], ...], marrow: float = 200.0) -> None:
