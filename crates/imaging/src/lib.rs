@@ -22,6 +22,7 @@ mod mask;
 mod morphology;
 mod orientation;
 mod outside;
+mod patient_position;
 pub mod read;
 mod reconstruct;
 pub mod registration;
@@ -47,6 +48,7 @@ pub use mask::{IndexBox, Mask};
 pub use morphology::{closed, dilated, eroded, opened};
 pub use orientation::{NoOrientation, Orientation};
 pub use outside::{AssumedBody, AssumedPiece, Outside};
+pub use patient_position::{Lying, PatientPosition};
 pub use reconstruct::{
     LesionSize, MeasuredLesion, NotGrown, Progress, ReconstructOptions, Reconstruction, Surface,
     SurfaceSizes, reconstruct,

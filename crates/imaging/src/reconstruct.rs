@@ -19,7 +19,7 @@ use crate::label_map::{
 };
 use crate::mapped_lesions::mapped_lesions;
 use crate::mask::{IndexBox, Mask};
-use crate::read::Lying;
+use crate::patient_position::Lying;
 use crate::segment::{
     BesideKind, Label, LabelFacts, Lesion, LesionSeed, Levels, SOFT_FROM_HU, Segmentation,
     centre_covariance_m2, check_complete, grow_lesion, label_map, segment,

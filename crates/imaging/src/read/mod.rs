@@ -21,7 +21,6 @@ mod nifti;
 mod nrrd;
 mod order;
 mod painted;
-mod patient_position;
 mod placing;
 mod plausibility;
 mod scalar;
@@ -38,12 +37,12 @@ use self::archive::Unpacked;
 use self::format::{Format, format_of};
 use self::scalar::Tally;
 use self::voxels::StoredVoxels;
+use crate::patient_position::PatientPosition;
 use crate::{ImagingError, Orientation, Remark, Volume, VoxelGrid};
 
 pub use label_names::read_label_names;
 pub use labelled::ReadLabels;
 pub use labels::read_labels;
-pub use patient_position::{Lying, PatientPosition};
 
 /// How to read.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,7 +6,7 @@ use crate::components::{Component, Components, Connectivity};
 use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::dilated;
-use crate::read::Lying;
+use crate::patient_position::Lying;
 use crate::spacing::whole;
 
 use super::body::Body;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::mask::Mask;
-use crate::read::Lying;
+use crate::patient_position::Lying;
 use crate::spacing::whole;
 
 use super::Scan;

@@ -17,7 +17,7 @@ use crate::error::{ImagingError, Remark};
 use crate::field_of_view::FieldOfView;
 use crate::mask::{IndexBox, Mask};
 use crate::orientation::Orientation;
-use crate::read::Lying;
+use crate::patient_position::Lying;
 use crate::spacing::{orthogonal, whole};
 use crate::volume::Volume;
 

@@ -1,8 +1,6 @@
 //! Round fields of view that do not hold all of the patient, nor what the patient lies on.
 
-use needlebench_imaging::{
-    Label, LabelMap, ReconstructOptions, Reconstruction, Volume, read::Lying,
-};
+use needlebench_imaging::{Label, LabelMap, Lying, ReconstructOptions, Reconstruction, Volume};
 
 use super::beside::in_the_scanner;
 use super::reconstruct::{MM, grid, label_at, options, render, run};

@@ -11,7 +11,7 @@ use super::file::OpenedFile;
 use super::syntax::TransferSyntax;
 use super::tag::{self, Tag};
 use crate::ImagingError;
-use crate::read::PatientPosition;
+use crate::patient_position::PatientPosition;
 use crate::read::scalar::{Kind, Rescale, Stored};
 use crate::read::segments::name_of;
 

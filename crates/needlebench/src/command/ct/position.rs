@@ -2,8 +2,8 @@
 
 use needlebench_bench::ct::{PatientFrame, ScanBuild};
 use needlebench_imaging::Remark;
-use needlebench_imaging::read::{Lying, PatientPosition};
 use needlebench_imaging::registration::ReferenceFrame;
+use needlebench_imaging::{Lying, PatientPosition};
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::scenario::{GantrySection, PhantomSection, Posture, Scenario};
 
