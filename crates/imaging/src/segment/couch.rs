@@ -1,5 +1,7 @@
 //! The couch where the field of view does not show it.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Vector3};
 
 use crate::mask::Mask;
@@ -88,8 +90,7 @@ impl Axes {
 
     /// The highest voxel of a mask in each column across it, where there is one in any slice: the mean over slices, m.
     fn upper_side_m(&self, mask: &Mask) -> Vec<(usize, f64)> {
-        let mut highest: Vec<std::collections::BTreeMap<usize, f64>> =
-            vec![Default::default(); mask.size()[self.across]];
+        let mut highest = vec![BTreeMap::<usize, f64>::new(); mask.size()[self.across]];
         for voxel in mask.voxels() {
             let height_m = self.height_m(voxel[self.upwards]);
             let of_slice = highest[voxel[self.across]].entry(voxel[2]);
@@ -119,68 +120,52 @@ pub(super) fn beyond(
     let axes = Axes::of(scan, lying);
     let size = scan.size();
     let mut found = Mask::empty(size);
-    let (hollow, from_to) = match couch {
-        Some(couch) => {
-            let side = axes.upper_side_m(couch);
-            let [Some(&(first, _)), Some(&(last, _))] = [side.first(), side.last()] else {
-                return found;
-            };
-            (hollow_of(&axes, &side), [first, last])
-        }
-        None => {
-            if is_seen_below(scan, unseen, &axes, body) {
-                return found;
-            }
-            let lowest_m = lowest_m(&axes, body);
-            let middle = whole(body.centroid[axes.across]);
-            let hollow = Hollow {
-                polynomial: Vector3::new(lowest_m, 0.0, 0.5 / RADIUS_M),
-                middle_m: middle as f64 * axes.steps_m[0],
-            };
-            (hollow, [middle, middle])
-        }
-    };
-    let thick_m = couch.map_or(THICK_UNSEEN_M, |_| THICK_M);
-    let reach = whole(END_M / axes.steps_m[0]) + 1;
-    let slices = 0..size[2];
-    for column in 0..size[axes.across] {
-        // Beyond an end that the field of view cuts: there what is next to it was not seen.
-        let is_beyond = column < from_to[0] || column > from_to[1] || couch.is_none();
-        if !is_beyond {
-            continue;
-        }
-        let end = if column < from_to[0] {
-            from_to[0]
-        } else {
-            from_to[1]
+    let (hollow, [first, last]) = if let Some(couch) = couch {
+        let side = axes.upper_side_m(couch);
+        let [Some(&(first, _)), Some(&(last, _))] = [side.first(), side.last()] else {
+            return found;
         };
-        let next = if column < from_to[0] {
+        (hollow_of(&axes, &side), [first, last])
+    } else {
+        if is_seen_below(scan, unseen, &axes, body) {
+            return found;
+        }
+        let middle = whole(body.centroid[axes.across]);
+        let hollow = Hollow {
+            polynomial: Vector3::new(lowest_m(&axes, body), 0.0, 0.5 / RADIUS_M),
+            middle_m: middle as f64 * axes.steps_m[0],
+        };
+        (hollow, [middle, middle])
+    };
+    let rows_at = |column: usize, thick_m: f64| {
+        let top_m = hollow.height_m(column as f64 * axes.steps_m[0]);
+        axes.indices([top_m - thick_m, top_m], size[axes.upwards])
+    };
+    let voxel_at = |column: usize, row: usize, k: usize| {
+        let mut voxel = [0, 0, k];
+        (voxel[axes.across], voxel[axes.upwards]) = (column, row);
+        voxel
+    };
+    // Where it ends though the field of view goes on, it ends.
+    let reach = whole(END_M / axes.steps_m[0]) + 1;
+    let is_cut = |end: usize, k: usize| {
+        let beside = if end == first {
             end.saturating_sub(reach)
         } else {
             (end + reach).min(size[axes.across] - 1)
         };
-        let top_m = hollow.height_m(column as f64 * axes.steps_m[0]);
-        let end_m = hollow.height_m(end as f64 * axes.steps_m[0]);
-        let rows = axes.indices([top_m - thick_m, top_m], size[axes.upwards]);
-        for k in slices.clone() {
-            let at = |across: usize, upwards: usize| {
-                let mut voxel = [0, 0, k];
-                (voxel[axes.across], voxel[axes.upwards]) = (across, upwards);
-                voxel
-            };
-            let at_end = axes.indices([end_m, end_m], size[axes.upwards]);
-            let is_cut = couch.is_none()
-                || at_end.clone().any(|row| unseen.get(at(next, row)))
-                || at_end.is_empty();
-            if !is_cut {
-                continue;
-            }
-            for row in rows.clone() {
-                let voxel = at(column, row);
-                if unseen.get(voxel) {
-                    found.insert(voxel);
-                }
-            }
+        let mut rows = rows_at(end, 0.0);
+        couch.is_none() || rows.is_empty() || rows.any(|row| unseen.get(voxel_at(beside, row, k)))
+    };
+    let thick_m = couch.map_or(THICK_UNSEEN_M, |_| THICK_M);
+    let columns = 0..size[axes.across];
+    for column in columns.filter(|&it| it < first || it > last || couch.is_none()) {
+        let end = if column < first { first } else { last };
+        for k in (0..size[2]).filter(|&k| is_cut(end, k)) {
+            let voxels = rows_at(column, thick_m).map(|row| voxel_at(column, row, k));
+            voxels
+                .filter(|&voxel| unseen.get(voxel))
+                .for_each(|voxel| found.insert(voxel));
         }
     }
     found

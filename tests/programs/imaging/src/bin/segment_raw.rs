@@ -13,8 +13,8 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::Point3;
 use needlebench_imaging::{
     Components, Connectivity, DistanceField, DistanceOptions, FieldOfView, IndexBox, LesionSeed,
-    Levels, Mask, ReconstructOptions, Volume, VoxelGrid, dilated, eroded, label_map, reconstruct,
-    segment,
+    Levels, Lying, Mask, ReconstructOptions, Volume, VoxelGrid, dilated, eroded, label_map,
+    reconstruct, segment,
 };
 
 type Failure = Box<dyn std::error::Error>;
@@ -91,6 +91,7 @@ fn parts(volume: &Volume, out: &Path, report: &mut String) -> Result<(), Failure
     let found = segment(
         volume,
         &FieldOfView::of(volume),
+        Lying::Supine,
         &Levels::default(),
         &cancel,
     )?;
