@@ -177,20 +177,20 @@ pub fn without_inverted_parts(mesh: &TriangleMesh) -> TriangleMesh {
     let stays = |part: &&Vec<usize>| !part.iter().any(|triangle| inverted.contains(triangle));
     let mut kept: Vec<usize> = parts.iter().filter(stays).flatten().copied().collect();
     kept.sort_unstable();
-    let mut number = vec![None; mesh.vertices_m.len()];
-    let mut vertices_m = Vec::new();
-    let triangles = kept.into_iter().map(|triangle| {
-        mesh.triangles[triangle].map(|vertex| {
-            *number[vertex as usize].get_or_insert_with(|| {
-                vertices_m.push(mesh.vertices_m[vertex as usize]);
-                u32::try_from(vertices_m.len() - 1).unwrap_or(u32::MAX)
-            })
-        })
-    });
-    let triangles = triangles.collect();
+    let triangles: Vec<[u32; 3]> = kept.into_iter().map(|it| mesh.triangles[it]).collect();
+    let mut used: Vec<u32> = triangles.iter().flatten().copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    let number = |vertex| u32::try_from(used.partition_point(|&it| it < vertex));
     TriangleMesh {
-        vertices_m,
-        triangles,
+        vertices_m: used
+            .iter()
+            .map(|&it| mesh.vertices_m[it as usize])
+            .collect(),
+        triangles: triangles
+            .iter()
+            .map(|corners| corners.map(|vertex| number(vertex).unwrap_or(u32::MAX)))
+            .collect(),
     }
 }
 
