@@ -1,5 +1,7 @@
 //! Routes and the robot together.
 
+use std::cmp::Ordering;
+
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::Servo;
 use needlebench_evaluation::judge_posture;
@@ -8,8 +10,7 @@ use needlebench_evaluation::room::RoomModel;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_parallel::in_parallel;
 use needlebench_planning::{Candidate, Member, Merit, Planner, judge_route};
-use needlebench_routing::{Obstacle, RouteRules};
-use needlebench_scenario::scenario::GoalSection;
+use needlebench_routing::{Obstacle, Route, RouteRules};
 use needlebench_scenario::{Goal, GoalPlacer, ResolvedScenario};
 use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
 use serde::Serialize;
@@ -77,6 +78,16 @@ impl Asked {
         }
     }
 
+    /// A route with its goal in the cell; the robot was not checked yet.
+    fn placed(task: &RouteTask<'_>, placer: &GoalPlacer<'_>, rounded: &Rounded) -> Self {
+        let mut asked = Self::without_robot(rounded.clone());
+        match placer.place(&task.section_at(rounded.direction_deg)) {
+            Ok(goal) => asked.goal = Some(goal),
+            Err(finding) => asked.blocked = Some(finding.message),
+        }
+        asked
+    }
+
     pub fn working(&self) -> usize {
         self.configurations
             .iter()
@@ -87,14 +98,7 @@ impl Asked {
     /// The configuration to choose: of the feasible ones the best by the scenario's aim.
     pub fn best(&self) -> Option<&Served> {
         let works = self.configurations.iter().filter(|each| each.works());
-        works.fold(None, |best: Option<&Served>, each| match best {
-            Some(best)
-                if each.value.partial_cmp(&best.value) != Some(std::cmp::Ordering::Greater) =>
-            {
-                Some(best)
-            }
-            _ => Some(each),
-        })
+        preferred(works, |each| each.value)
     }
 
     /// What is left: of the needle's margins, with the error of the configuration to choose, and of that
@@ -108,105 +112,115 @@ impl Asked {
     }
 }
 
-/// Checks the robot of a scenario for all needle paths at once.
+/// The one of most value; of equal ones the first.
+fn preferred<T>(all: impl Iterator<Item = T>, value: impl Fn(&T) -> Option<Merit>) -> Option<T> {
+    all.reduce(|best, each| {
+        if value(&each).partial_cmp(&value(&best)) == Some(Ordering::Greater) {
+            each
+        } else {
+            best
+        }
+    })
+}
+
+/// Checks the robot of a scenario for all needle paths at once, and the room that it leaves about each entry.
 pub(super) fn ask(
     task: &RouteTask<'_>,
     rules: &RouteRules,
     routes: &[Rounded],
     control: &Control<'_>,
 ) -> Result<Vec<Asked>, SuggestError> {
-    with_robot(task, rules, routes, |robot, mut placed| {
-        control.progress.message("configurations");
-        control.progress.expect(robot.resolved.goals.len() as u64);
-        let answers = in_parallel(control.threads, &placed, |each| {
-            let answer = (!control.is_cancelled()).then(|| robot.answer(each));
-            if each.goal.is_some() {
+    let placer = GoalPlacer::new(task.resolved);
+    let mut asked: Vec<Asked> = routes
+        .iter()
+        .map(|rounded| Asked::placed(task, &placer, rounded))
+        .collect();
+    let mut resolved = task.resolved.clone();
+    resolved.goals = asked.iter().filter_map(|each| each.goal.clone()).collect();
+    let model = ClearanceModel::new(&resolved.cell);
+    let robot = Robot::new(&resolved, &model, rules)?;
+    let room = RoomModel::new(&resolved);
+    let mut numbers = 0..resolved.goals.len();
+    let numbered: Vec<(&Asked, Option<usize>)> = asked
+        .iter()
+        .map(|each| (each, each.goal.as_ref().and_then(|_| numbers.next())))
+        .collect();
+    control.progress.message("configurations");
+    control.progress.expect(resolved.goals.len() as u64);
+    let answers = in_parallel(control.threads, &numbered, |(each, number)| {
+        let answer = || {
+            let mut answer = robot.held(each);
+            if let Some(number) = *number {
+                for served in answer.iter_mut().filter(|served| served.works()) {
+                    served.room = served.candidate.as_ref().map(|candidate| {
+                        let taken = room.taken(number, &candidate.joints);
+                        room.sector(number).free_fraction(&taken)
+                    });
+                }
                 control.progress.step();
             }
+            robot.measure(each, &mut answer);
             answer
-        });
-        for (each, answer) in placed.iter_mut().zip(answers) {
-            each.asked.configurations = answer.ok_or(SuggestError::Interrupted)?;
-        }
-        Ok(placed.into_iter().map(|each| each.asked).collect())
-    })
+        };
+        (!control.is_cancelled()).then(answer)
+    });
+    for (each, answer) in asked.iter_mut().zip(answers) {
+        each.configurations = answer.ok_or(SuggestError::Interrupted)?;
+    }
+    Ok(asked)
 }
 
-/// Checks the robot for one needle path after the other, from the first on, until `enough` says that the next one need
-/// not be checked; returns those that were checked.
-pub(super) fn ask_until(
+/// The best needle path that is feasible in as many configurations as wanted; of equal ones the first.
+///
+/// `routes` are in the order of `better_first`, by what the needle alone has to spare. The robot leaves no more than that,
+/// and no more than clearances in excess of the required ones, which are known before any error is: only what could be
+/// better than the best path so far is checked further.
+pub(super) fn best_asked(
     task: &RouteTask<'_>,
     rules: &RouteRules,
     routes: &[Rounded],
     control: &Control<'_>,
-    enough: impl Fn(&[Asked], &Rounded) -> bool,
-) -> Result<Vec<Asked>, SuggestError> {
-    with_robot(task, rules, routes, |robot, placed| {
-        let mut asked: Vec<Asked> = Vec::new();
-        for mut each in placed {
-            if control.is_cancelled() {
-                return Err(SuggestError::Interrupted);
-            }
-            if enough(&asked, &each.asked.rounded) {
-                break;
-            }
-            each.asked.configurations = robot.answer(&each);
-            asked.push(each.asked);
-        }
-        Ok(asked)
-    })
-}
-
-/// A needle path in the cell, not checked yet.
-struct Placed {
-    asked: Asked,
-    /// Number of its goal in the cell; none if the goal cannot be there.
-    goal: Option<usize>,
-}
-
-/// A robot that stands by for some routes.
-fn with_robot<T>(
-    task: &RouteTask<'_>,
-    rules: &RouteRules,
-    routes: &[Rounded],
-    then: impl FnOnce(&Robot<'_>, Vec<Placed>) -> Result<T, SuggestError>,
-) -> Result<T, SuggestError> {
+    better_first: impl Fn((&Route, f64), (&Route, f64)) -> Ordering,
+) -> Result<Option<Asked>, SuggestError> {
     let placer = GoalPlacer::new(task.resolved);
-    let mut placed: Vec<Placed> = Vec::with_capacity(routes.len());
-    let mut sections: Vec<GoalSection> = Vec::new();
-    let mut goals: Vec<Goal> = Vec::new();
+    let model = ClearanceModel::new(&task.resolved.cell);
+    let robot = Robot::new(task.resolved, &model, rules)?;
+    let mut best: Option<Asked> = None;
     for rounded in routes {
-        let section = task.section_at(rounded.direction_deg);
-        let mut asked = Asked::without_robot(rounded.clone());
-        let mut number = None;
-        match placer.place(&section) {
-            Ok(goal) => {
-                number = Some(goals.len());
-                asked.goal = Some(goal.clone());
-                sections.push(section);
-                goals.push(goal);
-            }
-            Err(finding) => asked.blocked = Some(finding.message),
+        if control.is_cancelled() {
+            return Err(SuggestError::Interrupted);
         }
-        placed.push(Placed {
-            asked,
-            goal: number,
-        });
+        let is_beaten = |spare_m: f64| {
+            best.as_ref().is_some_and(|best| {
+                let best = (&best.rounded.route, best.spare_m());
+                better_first(best, (&rounded.route, spare_m)).is_le()
+            })
+        };
+        if is_beaten(rounded.route.spare_m) {
+            break;
+        }
+        let mut each = Asked::placed(task, &placer, rounded);
+        let mut answer = robot.held(&each);
+        let most_spare_m = answer
+            .iter()
+            .filter(|served| served.works())
+            .map(|served| served.clear_spare_m.min(rounded.route.spare_m))
+            .fold(f64::NEG_INFINITY, f64::max);
+        if is_beaten(most_spare_m) {
+            continue;
+        }
+        robot.measure_until(&each, &mut answer, task.wanted());
+        each.configurations = answer;
+        if each.working() >= task.wanted() && !is_beaten(each.spare_m()) {
+            best = Some(each);
+        }
     }
-    let mut resolved = task.resolved.clone();
-    resolved.goals = goals;
-    resolved.scenario.goals = sections;
-    let model = ClearanceModel::new(&resolved.cell);
-    let planner = Planner::new(&resolved, &model)
-        .map_err(|error| SuggestError::refused(error.to_string(), "only UR arms can be checked"))?;
-    let robot = Robot {
-        resolved: &resolved,
-        planner: &planner,
-        room: RoomModel::new(&resolved),
-        servo: servo_of(&resolved),
-        rules,
-    };
-    then(&robot, placed)
+    if let Some(best) = &mut best {
+        let mut answer = std::mem::take(&mut best.configurations);
+        robot.measure(best, &mut answer);
+        best.configurations = answer;
+    }
+    Ok(best)
 }
 
 /// The first criterion on clearances that a posture misses, or why one is not evaluated.
@@ -225,23 +239,33 @@ pub(super) fn meets_criteria(resolved: &ResolvedScenario, member: &Member) -> bo
 
 struct Robot<'a> {
     resolved: &'a ResolvedScenario,
-    planner: &'a Planner<'a>,
-    room: RoomModel<'a>,
+    planner: Planner<'a>,
     servo: Servo,
     rules: &'a RouteRules,
 }
 
-impl Robot<'_> {
-    /// All eight configurations on a route; none where its goal cannot be.
-    fn answer(&self, placed: &Placed) -> Vec<Served> {
-        placed
-            .goal
-            .map_or_else(Vec::new, |goal| self.serve(goal, &placed.asked.rounded))
+impl<'a> Robot<'a> {
+    fn new(
+        resolved: &'a ResolvedScenario,
+        model: &'a ClearanceModel,
+        rules: &'a RouteRules,
+    ) -> Result<Self, SuggestError> {
+        let planner = Planner::new(resolved, model).map_err(|error| {
+            SuggestError::refused(error.to_string(), "only UR arms can be checked")
+        })?;
+        Ok(Self {
+            resolved,
+            planner,
+            servo: servo_of(resolved),
+            rules,
+        })
     }
 
-    /// All eight configurations of a goal.
-    fn serve(&self, index: usize, rounded: &Rounded) -> Vec<Served> {
-        let goal = &self.resolved.goals[index];
+    /// All eight configurations on a route, by clearances alone; none where its goal cannot be.
+    fn held(&self, asked: &Asked) -> Vec<Served> {
+        let Some(goal) = &asked.goal else {
+            return Vec::new();
+        };
         let rolls = self.planner.rolls(goal, ROLLS);
         // The planned patient's own surfaces count, too: `run` holds the needle against them.
         let refused = judge_route(self.resolved, goal).filter(|judged| !judged.is_kept());
@@ -253,12 +277,32 @@ impl Robot<'_> {
                 if served.works() && refused.is_some() {
                     served.reason = Some("needle_route".to_owned());
                 }
-                if served.works() {
-                    self.measure(index, rounded, &mut served);
-                }
                 served
             })
             .collect()
+    }
+
+    /// Expected errors of those configurations that are feasible, and what they leave of the margins.
+    fn measure(&self, asked: &Asked, answer: &mut [Served]) {
+        self.measure_until(asked, answer, usize::MAX);
+    }
+
+    /// The same in the order of preference, until as many as wanted are feasible with their errors: the one to choose
+    /// is the first of these, whatever the errors of the others are.
+    fn measure_until(&self, asked: &Asked, answer: &mut [Served], wanted: usize) {
+        let Some(goal) = &asked.goal else {
+            return;
+        };
+        let is_measured = |served: &Served| served.works() && served.spare_m.is_some();
+        while answer.iter().filter(|served| is_measured(served)).count() < wanted {
+            let unknown = answer
+                .iter_mut()
+                .filter(|served| served.works() && served.spare_m.is_none());
+            let Some(next) = preferred(unknown, |served| served.value) else {
+                break;
+            };
+            self.measure_one(goal, &asked.rounded, next);
+        }
     }
 
     /// What a posture is worth. The best one comes nearest to all criteria: where it misses one, all miss one.
@@ -293,14 +337,11 @@ impl Robot<'_> {
         }
     }
 
-    /// Expected error, what it leaves of the margins, and the room.
-    fn measure(&self, index: usize, rounded: &Rounded, served: &mut Served) {
+    /// Expected error, and what it leaves of the margins.
+    fn measure_one(&self, goal: &Goal, rounded: &Rounded, served: &mut Served) {
         let Some(candidate) = &served.candidate else {
             return;
         };
-        let goal = &self.resolved.goals[index];
-        let taken = self.room.taken(index, &candidate.joints);
-        served.room = Some(self.room.sector(index).free_fraction(&taken));
         let error = self.error(goal, candidate);
         let (bias_m, sd_m) = match &error {
             Some(Ok(error)) => (error.bias_m, error.sd_m),

@@ -35,7 +35,7 @@ use needlebench_scenario::{GoalPlacer, ResolvedScenario};
 use crate::Control;
 use crate::ct::BuiltFolder;
 use crate::suggest::SuggestError;
-use joint::{Asked, Served, ask, ask_until};
+use joint::{Asked, Served, ask, best_asked};
 
 pub use freeing::free;
 pub use joint::AxisError;
@@ -320,15 +320,9 @@ impl FreeRoutes {
         let mut standing = self.standing.clone();
         standing
             .sort_by(|a, b| better_first(least, (&a.route, spare_m(a)), (&b.route, spare_m(b))));
-        let wanted = task.wanted();
-        let enough = |asked: &[Asked], next: &Rounded| {
-            best_of(asked, least, wanted).is_some_and(|best| {
-                let best = (&best.rounded.route, best.spare_m());
-                better_first(least, best, (&next.route, spare_m(next))).is_lt()
-            })
-        };
-        let asked = ask_until(task, &self.rules, &standing, control, enough)?;
-        Ok(best_of(&asked, least, wanted).and_then(ServedRoute::of))
+        let better_first = |a: (&Route, f64), b: (&Route, f64)| better_first(least, a, b);
+        let best = best_asked(task, &self.rules, &standing, control, better_first)?;
+        Ok(best.as_ref().and_then(ServedRoute::of))
     }
 
     /// Why [`FreeRoutes::best_served`] has none for a task.
@@ -408,15 +402,6 @@ fn better_first(
     by_odds
         .then(b_spare_m.total_cmp(&a_spare_m))
         .then(a.risk.log_odds.total_cmp(&b.risk.log_odds))
-}
-
-/// The best of those in which as many configurations are feasible as required.
-fn best_of(asked: &[Asked], least_log_odds: f64, wanted: usize) -> Option<&Asked> {
-    let served = asked.iter().filter(|each| each.working() >= wanted);
-    served.min_by(|a, b| {
-        let [a, b] = [a, b].map(|each| (&each.rounded.route, each.spare_m()));
-        better_first(least_log_odds, a, b)
-    })
 }
 
 fn least_log_odds<'a>(routes: impl Iterator<Item = &'a Rounded>) -> f64 {

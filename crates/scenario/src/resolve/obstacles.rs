@@ -157,16 +157,25 @@ pub(super) fn check_obstacle_names<'n>(
         "gantry",
         "mount",
     ];
-    let taken: std::collections::BTreeSet<&str> = taken.chain(ALWAYS).collect();
+    // Few obstacles, many parts: the names of the obstacles are what is looked up.
+    let mut first_of = std::collections::BTreeMap::new();
     for (index, section) in sections.iter().enumerate() {
-        if taken.contains(section.name.as_str()) {
-            let key = format!("obstacles[{index}].name");
-            let message = format!("another body in the cell is named `{}`", section.name);
-            let finding = toml.finding(&key, message);
-            return Err(finding.hint("names identify bodies in reports: choose another"));
-        }
+        first_of.entry(section.name.as_str()).or_insert(index);
     }
-    Ok(())
+    if first_of.is_empty() {
+        return Ok(());
+    }
+    let met = taken.chain(ALWAYS).filter_map(|name| first_of.get(name));
+    let Some(&index) = met.min() else {
+        return Ok(());
+    };
+    let key = format!("obstacles[{index}].name");
+    let message = format!(
+        "another body in the cell is named `{}`",
+        sections[index].name
+    );
+    let finding = toml.finding(&key, message);
+    Err(finding.hint("names identify bodies in reports: choose another"))
 }
 
 /// Makes the shape of an obstacle.
