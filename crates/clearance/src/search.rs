@@ -16,7 +16,8 @@ use std::cmp::Ordering;
 
 use needlebench_cell::{ClearanceClass, Frame};
 use needlebench_geometry::{
-    BoundingCapsule, PRUNING_MARGIN_M, Placement, Separation, is_nearer, separation_within,
+    Between, BoundingCapsule, PRUNING_MARGIN_M, Placement, Separation, is_nearer,
+    separation_between,
 };
 
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
@@ -84,7 +85,9 @@ impl ClearanceModel {
                 excess_of: None,
             },
         };
-        look.search(nearby, &mut counting);
+        if counts.excess_cap_m >= counts.ends_below_m {
+            look.search(nearby, &mut counting);
+        }
         counting.found
     }
 
@@ -229,8 +232,13 @@ pub(crate) trait Wanted {
         None
     }
 
-    /// A couple that ends the search.
-    fn end(&mut self) {}
+    /// A couple nearer than this ends the search, however much nearer it is, m.
+    fn ends_anyway_below_m(&self, _class: ClearanceClass) -> f64 {
+        f64::NEG_INFINITY
+    }
+
+    /// There is a couple that ends the search.
+    fn end(&mut self, _couple: Couple) {}
 }
 
 /// Travel that the bounds of a reference are to last for, of the way to it: a bisection's further
@@ -477,19 +485,24 @@ impl Look<'_> {
             let ends = is_nearer(&a.shape, &b.shape, &solid_b_from_solid_a, limit_m);
             if ends {
                 nearby.nearest[pair.class as usize] = Some(couple);
-                wanted.end();
+                wanted.end(couple);
             }
             return !ends;
         }
-        let Some(found) = separation_within(&a.shape, &b.shape, &solid_b_from_solid_a, cutoff_m)
-        else {
-            return true;
-        };
-        if found.distance_m > cutoff_m {
-            return true;
+        let limit_m = wanted.ends_anyway_below_m(pair.class);
+        match separation_between(&a.shape, &b.shape, &solid_b_from_solid_a, limit_m, cutoff_m) {
+            Between::BeyondCutoff => true,
+            Between::Below => {
+                nearby.nearest[pair.class as usize] = Some(couple);
+                wanted.end(couple);
+                false
+            }
+            Between::Found(found) if found.distance_m > cutoff_m => true,
+            Between::Found(found) => {
+                nearby.nearest[pair.class as usize] = Some(couple);
+                wanted.take(pair.class, couple, &found)
+            }
         }
-        nearby.nearest[pair.class as usize] = Some(couple);
-        wanted.take(pair.class, couple, &found)
     }
 
     fn place(&self, body: &PlacedBody, seen: &Seen) -> Placement {
@@ -579,6 +592,8 @@ pub struct Counts {
     pub floor_m: [f64; CLASS_COUNT],
     /// Up to where the least excess over the floors counts, m. Where it is negative nothing else does.
     pub excess_cap_m: f64,
+    /// An excess below this is enough to know, m: nothing else is looked at then. Negative infinity where all is asked.
+    pub ends_below_m: f64,
 }
 
 /// Clearances as far as they count.
@@ -588,7 +603,8 @@ pub struct Counted {
     pub by_class_m: [f64; CLASS_COUNT],
     /// By group: the least clearance, or the cap where that is less, m.
     pub aim_m: [f64; AIMS],
-    /// The least excess over a floor, or the cap where that is less, m. Where it is negative it alone is right.
+    /// The least excess over a floor, or the cap where that is less, m. Where it is negative it alone is right; where it is
+    /// below [`Counts::ends_below_m`] it is only known that the least one is, and the value may be any such.
     pub excess_m: f64,
     /// The pair whose excess it is, an index into [`Cell::pairs`](needlebench_cell::Cell::pairs), unless it is
     /// the cap.
@@ -647,7 +663,17 @@ impl Wanted for Counting<'_> {
             self.found.excess_m = excess_m;
             self.found.excess_of = Some(couple.pair);
         }
-        true
+        self.found.excess_m >= counts.ends_below_m
+    }
+
+    #[inline]
+    fn ends_anyway_below_m(&self, class: ClearanceClass) -> f64 {
+        self.counts.floor_m[class as usize] + self.counts.ends_below_m
+    }
+
+    fn end(&mut self, couple: Couple) {
+        self.found.excess_m = f64::NEG_INFINITY;
+        self.found.excess_of = Some(couple.pair);
     }
 }
 
@@ -719,7 +745,7 @@ impl Wanted for AnyBelow {
         Some(self.limits_m[class as usize])
     }
 
-    fn end(&mut self) {
+    fn end(&mut self, _: Couple) {
         self.found = true;
     }
 }

@@ -55,12 +55,48 @@ pub fn separation_within(
     }
     let radius_m = a.radius_m + b.radius_m;
     let core = core_separation(a, b, b_from_a, cutoff_m + radius_m)?;
-    Some(Separation {
-        distance_m: core.distance_m - radius_m,
+    Some(with_radii(a, b, &core))
+}
+
+fn with_radii(a: &PreparedShape, b: &PreparedShape, core: &CoreSeparation) -> Separation {
+    Separation {
+        distance_m: core.distance_m - (a.radius_m + b.radius_m),
         normal: Unit::new_unchecked(core.normal),
         point_on_a: (core.on_a + core.normal * a.radius_m).into(),
         point_on_b: (core.on_b - core.normal * b.radius_m).into(),
-    })
+    }
+}
+
+/// What is known of the signed distance of two shapes between two limits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Between {
+    /// It is certainly larger than the cutoff.
+    BeyondCutoff,
+    /// It is certainly less than the limit.
+    Below,
+    /// It is this.
+    Found(Separation),
+}
+
+/// The signed distance in the frame of B as [`separation_within`] has it, unless the shapes penetrate and the depth, which
+/// takes the longest, only says that it is below a limit.
+pub fn separation_between(
+    a: &PreparedShape,
+    b: &PreparedShape,
+    b_from_a: &Placement,
+    limit_m: f64,
+    cutoff_m: f64,
+) -> Between {
+    let is_solid = !a.is_surface() && !b.is_surface();
+    if is_solid && limit_m > 0.0 {
+        let radius_m = a.radius_m + b.radius_m;
+        return match core_gap(a, b, b_from_a, cutoff_m + radius_m) {
+            Gap::Apart(core) => Between::Found(with_radii(a, b, &core)),
+            Gap::BeyondCutoff => Between::BeyondCutoff,
+            Gap::Overlap => Between::Below,
+        };
+    }
+    separation_within(a, b, b_from_a, cutoff_m).map_or(Between::BeyondCutoff, Between::Found)
 }
 
 /// Whether the signed distance is less than a limit, or is not a number: what [`separation_within`] says, without the

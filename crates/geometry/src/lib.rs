@@ -98,7 +98,9 @@ mod tree;
 mod triangle_mesh;
 
 pub use bounds::{BoundingCapsule, OrientedBox};
-pub use distance::{PRUNING_MARGIN_M, is_nearer, separation, separation_within};
+pub use distance::{
+    Between, PRUNING_MARGIN_M, is_nearer, separation, separation_between, separation_within,
+};
 pub use mesh::SolidMesh;
 pub use placement::Placement;
 pub use prepared::PreparedShape;

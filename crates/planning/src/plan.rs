@@ -107,10 +107,11 @@ impl Planner<'_> {
         let mut sweep = Sweep::new(self, goal, configuration);
         let mut best: Option<(Merit, f64)> = None;
         for &roll_rad in rolls_rad {
-            if !sweep.works(roll_rad) {
+            let seen = sweep.glance(aim, roll_rad);
+            if !seen.works {
                 continue;
             }
-            let merit = sweep.glance(aim, roll_rad).merit;
+            let merit = seen.merit;
             if best.is_none_or(|(other, _)| merit.better_first(&other) == Ordering::Less) {
                 best = Some((merit, roll_rad));
             }

@@ -166,6 +166,7 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
         aim_cap_m: [0.1, f64::NEG_INFINITY, f64::INFINITY],
         floor_m: all.map(floor_m),
         excess_cap_m: 0.03,
+        ends_below_m: f64::NEG_INFINITY,
     };
     for (cell, count) in [(cell(), 900), (with_dented_skin(cell()), 60)] {
         let model = ClearanceModel::new(&cell);
@@ -205,6 +206,19 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
                 pair.separation.distance_m - floor_m(pair.class)
             });
             assert_eq!(of_pair.unwrap_or(counts.excess_cap_m), excess_m, "{k}");
+            // Where less than a limit is enough to know.
+            for ends_below_m in [-0.05, -0.02, 0.0, 0.05] {
+                let counts = Counts {
+                    ends_below_m,
+                    ..counts
+                };
+                let ended = model.what_counts_near(&q, &mut mixed, &counts);
+                if excess_m < ends_below_m {
+                    assert!(ended.excess_m < ends_below_m, "{k}");
+                } else {
+                    assert_eq!(ended.excess_m, excess_m, "{k}");
+                }
+            }
             if excess_m >= 0.0 {
                 for aim in 0..AIMS {
                     let least_m = least(&|class| counts.aim_of[class as usize] == Some(aim));

@@ -9,7 +9,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::core_separation::CoreSeparation;
 use super::difference::Difference;
-use super::polytope::{End, Flat, Overlap, Polytope};
+use super::polytope::{End, NoPolytope, Overlap, Polytope};
 
 /// Attempts from different tetrahedra when rounding spoils one.
 const ATTEMPTS: u32 = 4;
@@ -32,9 +32,10 @@ pub(crate) fn depth(difference: &mut Difference<'_>, cutoff_m: f64) -> Option<Co
         // Slivers can upset the surface; other slivers arise from other axes.
         let turn = f64::from(attempt);
         let axes = Rotation3::from_euler_angles(0.7 * turn, 1.1 * turn, 0.3 * turn);
-        let mut polytope = match Polytope::around(difference, axes.matrix()) {
+        let mut polytope = match Polytope::around(difference, axes.matrix(), cutoff_m) {
             Ok(polytope) => polytope,
-            Err(Flat { across }) => return Some(across_flat(difference, &across)),
+            Err(NoPolytope::Flat { across }) => return Some(across_flat(difference, &across)),
+            Err(NoPolytope::BeyondCutoff) => return None,
         };
         let found = match polytope.grow(difference, cutoff_m, &mut best) {
             End::Certified(found) => found,

@@ -60,10 +60,13 @@ pub(crate) enum End {
     Inconsistent,
 }
 
-/// The difference has no volume; its extent along the unit vector `across` is rounding.
+/// Why there is no polytope to grow.
 #[derive(Debug)]
-pub(crate) struct Flat {
-    pub across: Vector3<f64>,
+pub(crate) enum NoPolytope {
+    /// The difference has no volume; its extent along the unit vector `across` is rounding.
+    Flat { across: Vector3<f64> },
+    /// The distance is certainly larger than the cutoff.
+    BeyondCutoff,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -133,16 +136,28 @@ pub(crate) struct Polytope {
 impl Polytope {
     /// A tetrahedron of support points. It need not contain the origin: faces that the origin is
     /// in front of are expanded first.
-    pub fn around(difference: &mut Difference<'_>, axes: &Matrix3<f64>) -> Result<Self, Flat> {
+    ///
+    /// Each support point is an overlap too: where one is below the cutoff's, nothing needs to grow.
+    pub fn around(
+        difference: &mut Difference<'_>,
+        axes: &Matrix3<f64>,
+        cutoff_m: f64,
+    ) -> Result<Self, NoPolytope> {
         let ends = |difference: &mut Difference<'_>, direction: &Vector3<f64>| {
-            [
-                difference.support(direction),
-                difference.support(&-direction),
-            ]
+            let [ahead, behind] = [*direction, -direction].map(|along| {
+                let vertex = difference.support(&along);
+                (vertex, -along.dot(&vertex.x))
+            });
+            if ahead.1.max(behind.1) > cutoff_m {
+                Err(NoPolytope::BeyondCutoff)
+            } else {
+                Ok([ahead.0, behind.0])
+            }
         };
         let length_m = |[one, other]: &[Vertex; 2]| (one.x - other.x).norm();
-        let [mut longest, other, another] =
-            [0, 1, 2].map(|i| ends(difference, &axes.column(i).into()));
+        let mut longest = ends(difference, &axes.column(0).into())?;
+        let other = ends(difference, &axes.column(1).into())?;
+        let another = ends(difference, &axes.column(2).into())?;
         for candidate in [other, another] {
             if length_m(&candidate) > length_m(&longest) {
                 longest = candidate;
@@ -153,7 +168,7 @@ impl Polytope {
         let flat_m = FLAT * extent_m;
         let thin_m = THIN * extent_m;
         let Some(edge) = (second.x - first.x).try_normalize(thin_m) else {
-            return Err(Flat {
+            return Err(NoPolytope::Flat {
                 across: Vector3::z(),
             });
         };
@@ -163,17 +178,17 @@ impl Polytope {
         let one_side = edge.cross(&side).normalize();
         let other_side = edge.cross(&one_side);
         let from_edge = |x: &Vector3<f64>| (x - first.x).cross(&edge).norm();
-        let [a, b] = ends(difference, &one_side);
-        let [c, d] = ends(difference, &other_side);
+        let [a, b] = ends(difference, &one_side)?;
+        let [c, d] = ends(difference, &other_side)?;
         let third = farthest([a, b, c, d], from_edge);
         let Some(normal) = edge.cross(&(third.x - first.x)).try_normalize(thin_m) else {
-            return Err(Flat { across: one_side });
+            return Err(NoPolytope::Flat { across: one_side });
         };
         let from_face = |x: &Vector3<f64>| (x - first.x).dot(&normal);
-        let fourth = farthest(ends(difference, &normal), |x| from_face(x).abs());
+        let fourth = farthest(ends(difference, &normal)?, |x| from_face(x).abs());
         let height_m = from_face(&fourth.x);
         if height_m.abs() <= thin_m {
-            return Err(Flat { across: normal });
+            return Err(NoPolytope::Flat { across: normal });
         }
         // Counter-clockwise from outside: the fourth vertex is behind the face of the others.
         let (second, third) = if height_m > 0.0 {

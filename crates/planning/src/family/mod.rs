@@ -113,7 +113,7 @@ pub(crate) struct Glance {
     pub exists: bool,
     /// It violates no rule.
     pub works: bool,
-    /// [`Member::surplus`], of one that exists; else negative infinity.
+    /// [`Member::surplus`] of one that exists, as far as it was asked for; else any value below the asked one.
     pub surplus: f64,
     /// The pair whose clearance it is, unless the joints decide it.
     pub decided_by: Option<usize>,
@@ -135,10 +135,20 @@ pub(crate) enum Level {
 /// What is asked of a member.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Asked {
-    /// Its merit for an aim.
+    /// Its merit for an aim, of one that violates no rule.
     Merit(Aim),
     /// How far it is from violating a rule if clearances had to keep a level.
     Surplus(Level),
+}
+
+impl Asked {
+    /// A constraint margin below this is as good as any other.
+    fn ends_below_m(self) -> f64 {
+        match self {
+            Self::Merit(_) => 0.0,
+            Self::Surplus(_) => f64::NEG_INFINITY,
+        }
+    }
 }
 
 /// One configuration looked at at one roll after the other: each look is quicker by what the one before
@@ -178,12 +188,18 @@ impl<'p> Sweep<'p> {
 
     /// What an aim's choice needs to know of the member at a roll.
     pub(crate) fn glance(&mut self, aim: Aim, roll_rad: f64) -> Glance {
-        self.look(Asked::Merit(aim), roll_rad)
+        let asked = Asked::Merit(aim);
+        self.look(asked, roll_rad, asked.ends_below_m())
     }
 
     /// Constraint margin of the member at a roll if clearances had to keep a level, and whether it keeps that.
     pub fn keeps(&mut self, level: Level, roll_rad: f64) -> Glance {
-        self.look(Asked::Surplus(level), roll_rad)
+        self.keeps_more_than(f64::NEG_INFINITY, level, roll_rad)
+    }
+
+    /// The same; a constraint margin below `least` may come out as any other below it.
+    pub fn keeps_more_than(&mut self, least: f64, level: Level, roll_rad: f64) -> Glance {
+        self.look(Asked::Surplus(level), roll_rad, least)
     }
 
     /// Whether what keeps a roll from working keeps all from working between it and another: it is broken by
@@ -225,7 +241,7 @@ impl<'p> Sweep<'p> {
         }
     }
 
-    fn look(&mut self, asked: Asked, roll_rad: f64) -> Glance {
+    fn look(&mut self, asked: Asked, roll_rad: f64, ends_below_m: f64) -> Glance {
         let planner = self.planner;
         let Some(solution) = self.solution(roll_rad) else {
             return Glance {
@@ -248,6 +264,7 @@ impl<'p> Sweep<'p> {
             }
         };
         counts.excess_cap_m = planner.surplus_of_joints(&margins, &broken);
+        counts.ends_below_m = ends_below_m;
         let model = planner.checker.model;
         let found = model.what_counts_near(q, &mut self.nearby, &counts);
         let works = broken.is_empty() && found.excess_m >= 0.0;
@@ -346,6 +363,7 @@ impl Planner<'_> {
                 Level::Wanted => limits.get(class).wanted_m,
             }),
             excess_cap_m: f64::INFINITY,
+            ends_below_m: asked.ends_below_m(),
         };
         let Asked::Merit(aim) = asked else {
             return counts;
@@ -521,6 +539,14 @@ mod tests {
                         let alone = planner.member_at(goal, configuration, roll_rad);
                         assert_eq!(sweep.works(roll_rad), alone.works());
                         assert_eq!(sweep.surplus(roll_rad), (alone.surplus, alone.works()));
+                        for least in [-0.05, -0.002, 0.0] {
+                            let seen = sweep.keeps_more_than(least, Level::Floor, roll_rad);
+                            if alone.candidate.is_some() && alone.surplus >= least {
+                                assert_eq!(seen.surplus, alone.surplus);
+                            } else {
+                                assert!(seen.surplus < least);
+                            }
+                        }
                         // Values need the least of each group alone.
                         for aim in Aim::ALL {
                             let merit = match &alone.candidate {
@@ -533,9 +559,9 @@ mod tests {
                             assert_eq!(glance.merit, merit, "{aim:?}");
                             assert_eq!(glance.works, alone.works());
                             assert_eq!(glance.exists, alone.candidate.is_some());
-                            if glance.exists {
-                                assert_eq!(glance.surplus, alone.surplus);
-                            }
+                            assert!(
+                                !glance.exists || (glance.surplus < 0.0) == (alone.surplus < 0.0)
+                            );
                         }
                         assert_eq!(sweep.member(roll_rad), alone);
                         working += usize::from(alone.works());

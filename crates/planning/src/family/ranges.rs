@@ -289,13 +289,18 @@ impl Planner<'_> {
         if let Some(best) = best {
             return sweep.member(best.roll_rad.rem_euclid(TAU));
         }
-        let nearest = grid.iter().filter(|seen| seen.glance.exists);
-        let nearest = nearest.reduce(|best, each| {
-            let is_nearer = each.glance.surplus > best.glance.surplus;
-            if is_nearer { each } else { best }
-        });
-        if let Some(seen) = nearest {
-            return sweep.member(seen.roll_rad);
+        let mut nearest: Option<(f64, f64)> = None;
+        for seen in grid.iter().filter(|seen| seen.glance.exists) {
+            let most = nearest.map_or(f64::NEG_INFINITY, |(most, _)| most);
+            let surplus = sweep
+                .keeps_more_than(most, Level::Floor, seen.roll_rad)
+                .surplus;
+            if nearest.is_none() || surplus > most {
+                nearest = Some((surplus, seen.roll_rad));
+            }
+        }
+        if let Some((_, roll_rad)) = nearest {
+            return sweep.member(roll_rad);
         }
         let grid = rolls_rad.iter().map(|&roll_rad| sweep.member(roll_rad));
         nearest_missing(grid.collect())
