@@ -56,9 +56,9 @@ pub use reconstruct::{
 pub use reorder::in_order;
 pub use resample::{Resampled, resample, resample_labels};
 pub use segment::{
-    Beside, BesideKind, Body, Bone, FIRST_LESION, Label, LabelFacts, Lesion, LesionSeed, Levels,
-    Lung, Lungs, Segmentation, Side, label_map, segment,
+    Beside, Body, Bone, FIRST_LESION, Label, LabelFacts, Lesion, LesionSeed, Levels, Lung, Lungs,
+    Segmentation, Side, label_map, segment,
 };
-pub use structures::{Structure, SurfaceTissue, structure_of};
-pub use surface::{Field, Level, SurfaceError, Values};
+pub use structures::{BesideKind, Structure, SurfaceTissue, structure_of};
+pub use surface::{Field, Level, SurfaceError, Values, stl_bytes};
 pub use volume::{AIR_HU, LabelMap, Volume};

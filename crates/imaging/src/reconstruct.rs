@@ -21,11 +21,11 @@ use crate::mapped_lesions::mapped_lesions;
 use crate::mask::{IndexBox, Mask};
 use crate::patient_position::Lying;
 use crate::segment::{
-    BesideKind, Label, LabelFacts, Lesion, LesionSeed, Levels, SOFT_FROM_HU, Segmentation,
+    Label, LabelFacts, Lesion, LesionSeed, Levels, SOFT_FROM_HU, Segmentation,
     centre_covariance_m2, check_complete, grow_lesion, label_map, segment,
 };
 use crate::spacing::{orthogonal, whole};
-use crate::structures::SurfaceTissue;
+use crate::structures::{BesideKind, SurfaceTissue};
 use crate::surface::{
     Field, Level, SurfaceError, Values, at_middles, local_level, refine, simplify, sound,
     surface_error, surface_net,

@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::segment::BesideKind;
-
 /// What a surface is of, in the words of `[[phantom.parts]]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -22,6 +20,34 @@ pub enum SurfaceTissue {
     Lesion,
     /// Beside the body: an arm, the couch, a cushion.
     Beside,
+}
+
+/// What something beside the body is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BesideKind {
+    /// Arms that do not touch the trunk, or other limbs.
+    Arms,
+    /// What the patient lies on, through all slices.
+    Couch,
+    /// Anything else: cushions, rails, tubes, cables.
+    Objects,
+    /// Where the couch is taken to be beyond a field of view that does not show all of it.
+    AssumedCouch,
+}
+
+impl BesideKind {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Arms, Self::Couch, Self::Objects, Self::AssumedCouch];
+
+    /// Its name in label maps, and of its surface.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Arms => "arms",
+            Self::Couch => "couch",
+            Self::Objects => "objects",
+            Self::AssumedCouch => "assumed_couch",
+        }
+    }
 }
 
 /// What a label stands for. Labels with the same name are one structure.

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use needlebench_geometry::TriangleMesh;
 use needlebench_imaging::write::{
-    TEMPORARY_PREFIX, stl_bytes, write_bytes, write_label_nifti, write_nifti, write_seg_nrrd,
+    TEMPORARY_PREFIX, write_bytes, write_label_nifti, write_nifti, write_seg_nrrd,
 };
-use needlebench_imaging::{ImagingError, Remark};
+use needlebench_imaging::{ImagingError, Remark, stl_bytes};
 use needlebench_input::{from_toml, read_text, sha256_hex};
 use needlebench_scenario::scenario::{BuildSection, GoalSection};
 use needlebench_scenario::scenario_text;

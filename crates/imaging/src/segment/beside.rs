@@ -8,6 +8,7 @@ use crate::mask::{IndexBox, Mask};
 use crate::morphology::dilated;
 use crate::patient_position::Lying;
 use crate::spacing::whole;
+use crate::structures::BesideKind;
 
 use super::body::Body;
 use super::{Scan, couch};
@@ -50,34 +51,6 @@ const COUCH_WIDTH_M: f64 = 0.06;
 
 /// and goes through at least this share of the slices.
 const COUCH_SHARE: f64 = 0.8;
-
-/// What something beside the body is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BesideKind {
-    /// Arms that do not touch the trunk, or other limbs.
-    Arms,
-    /// What the patient lies on, through all slices.
-    Couch,
-    /// Anything else: cushions, rails, tubes, cables.
-    Objects,
-    /// Where the couch is taken to be beyond a field of view that does not show all of it.
-    AssumedCouch,
-}
-
-impl BesideKind {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Arms, Self::Couch, Self::Objects, Self::AssumedCouch];
-
-    /// Its name in label maps, and of its surface.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Arms => "arms",
-            Self::Couch => "couch",
-            Self::Objects => "objects",
-            Self::AssumedCouch => "assumed_couch",
-        }
-    }
-}
 
 /// All of a kind beside the body.
 #[derive(Debug, Clone)]

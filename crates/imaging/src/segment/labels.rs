@@ -3,10 +3,11 @@
 use serde::Serialize;
 
 use crate::mask::{IndexBox, Mask};
+use crate::structures::BesideKind;
 use crate::volume::LabelMap;
 use crate::volume::Volume;
 
-use super::{BesideKind, Lesion, Segmentation, Side};
+use super::{Lesion, Segmentation, Side};
 
 /// Numbers of the label maps that this crate makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

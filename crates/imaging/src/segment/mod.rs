@@ -21,7 +21,7 @@ use crate::patient_position::Lying;
 use crate::spacing::{orthogonal, whole};
 use crate::volume::Volume;
 
-pub use beside::{Beside, BesideKind};
+pub use beside::Beside;
 pub use body::Body;
 pub(crate) use body::SKIN_LEVEL_HU;
 pub use bone::Bone;

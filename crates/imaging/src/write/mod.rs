@@ -6,10 +6,8 @@ mod dicom;
 mod file;
 mod nifti;
 mod seg_nrrd;
-mod stl;
 
 pub use dicom::{DicomSeries, write_dicom};
 pub use file::{TEMPORARY_PREFIX, stream, write_bytes};
 pub use nifti::{write_label_nifti, write_nifti};
 pub use seg_nrrd::write_seg_nrrd;
-pub use stl::stl_bytes;

@@ -9,7 +9,6 @@ use flate2::write::GzEncoder;
 use nalgebra::Vector3;
 
 use super::file::{go_on, write_whole};
-use crate::mask::IndexBox;
 use crate::{ImagingError, LabelMap, SurfaceTissue, structure_of};
 
 /// As for NIfTI: fastest.
@@ -79,7 +78,7 @@ fn header(map: &LabelMap, is_byte: bool) -> String {
     for (number, (label, name)) in map.names.iter().enumerate() {
         let [red, green, blue] = color(*label, name);
         let extent = match &extents[usize::from(*label)] {
-            Some(IndexBox { first, last }) => {
+            Some([first, last]) => {
                 let ends = first.iter().zip(last);
                 let ends: Vec<String> = ends
                     .map(|(first, last)| format!("{first} {last}"))
@@ -117,22 +116,19 @@ fn header(map: &LabelMap, is_byte: bool) -> String {
     format!("{}\n\n", lines.join("\n"))
 }
 
-/// Of each label the least box around its voxels.
-fn extents(map: &LabelMap) -> Vec<Option<IndexBox>> {
-    let mut extents: Vec<Option<IndexBox>> = vec![None; 1 << 16];
+/// Of each label the first and the last voxel of the least box around its own.
+fn extents(map: &LabelMap) -> Vec<Option<[[usize; 3]; 2]>> {
+    let mut extents: Vec<Option<[[usize; 3]; 2]>> = vec![None; 1 << 16];
     let [columns, rows, _] = map.grid.size();
     for (row, labels) in map.labels.chunks(columns).enumerate() {
         let (j, k) = (row % rows, row / rows);
         let mut i = 0;
         for run in labels.chunk_by(|a, b| a == b) {
             let [from, to] = [[i, j, k], [i + run.len() - 1, j, k]];
-            let extent = extents[usize::from(run[0])].get_or_insert(IndexBox {
-                first: from,
-                last: to,
-            });
+            let [first, last] = extents[usize::from(run[0])].get_or_insert([from, to]);
             for axis in 0..3 {
-                extent.first[axis] = extent.first[axis].min(from[axis]);
-                extent.last[axis] = extent.last[axis].max(to[axis]);
+                first[axis] = first[axis].min(from[axis]);
+                last[axis] = last[axis].max(to[axis]);
             }
             i += run.len();
         }
