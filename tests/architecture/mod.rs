@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Every crate under `crates/`, the Python package, and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 34] = [
+const LAYERS: [(&str, &[&str]); 35] = [
     ("elementary", &[]),
     ("parallel", &[]),
     ("numerics", &[]),
@@ -65,18 +65,20 @@ const LAYERS: [(&str, &[&str]); 34] = [
         "recorded",
         &["ros", "scenario", "cell", "input", "kinematics"],
     ),
+    ("volume", &["parallel"]),
     (
         "imaging",
-        &["geometry", "kinematics", "numerics", "parallel"],
+        &["volume", "geometry", "kinematics", "numerics", "parallel"],
     ),
     (
         "synthesis",
-        &["imaging", "geometry", "kinematics", "numerics"],
+        &["volume", "geometry", "kinematics", "numerics"],
     ),
     (
         "routing",
         &[
             "imaging",
+            "volume",
             "scenario",
             "phantom",
             "cell",
@@ -109,6 +111,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "evaluation",
             "routing",
             "imaging",
+            "volume",
             "urscript",
             "recorded",
             "study",
@@ -153,6 +156,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "bench",
             "evaluation",
             "imaging",
+            "volume",
             "recorded",
             "study",
             "uncertainty",
@@ -179,7 +183,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "bench",
             "evaluation",
             "routing",
-            "imaging",
+            "volume",
             "uncertainty",
             "planning",
             "scenario",
@@ -217,6 +221,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "bench",
             "evaluation",
             "imaging",
+            "volume",
             "recorded",
             "study",
             "engine",
@@ -250,7 +255,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
 ];
 
 /// The same for tests alone: what their inputs are made of.
-const FOR_TESTS: [(&str, &[&str]); 8] = [
+const FOR_TESTS: [(&str, &[&str]); 9] = [
     ("geometry", &["numerics"]),
     ("scenario", &["numerics"]),
     ("clearance", &["input", "robot", "scenario"]),
@@ -259,6 +264,7 @@ const FOR_TESTS: [(&str, &[&str]); 8] = [
     ("recorded", &["numerics"]),
     ("routing", &["numerics"]),
     ("iso9283", &["numerics"]),
+    ("viewer", &["imaging"]),
 ];
 
 /// Dependencies that few crates have, hidden behind their own types.
@@ -288,7 +294,7 @@ const OWNERS: [(&str, &[&str]); 21] = [
     ("zstd", &["study"]),
     ("crc32fast", &["study"]),
     ("mcap", &["ros"]),
-    ("dicom-transfer-syntax-registry", &["imaging"]),
+    ("dicom-transfer-syntax-registry", &["volume"]),
     ("axum", &["viewer"]),
     ("png", &["render"]),
     ("quick-junit", &["report"]),

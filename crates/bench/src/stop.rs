@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use needlebench_imaging::ImagingError;
 use needlebench_input::Finding;
+use needlebench_volume::VolumeError;
 
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,10 +16,10 @@ pub enum Stop {
 
 impl Stop {
     /// Of a scan, with the file that it is about.
-    pub fn of_scan(file: &Path, error: ImagingError) -> Self {
+    pub fn of_scan(file: &Path, error: VolumeError) -> Self {
         match error {
-            ImagingError::Interrupted => Self::Interrupted,
-            ImagingError::Refused {
+            VolumeError::Interrupted => Self::Interrupted,
+            VolumeError::Refused {
                 place,
                 message,
                 hint,

@@ -7,17 +7,20 @@ use nalgebra::{Matrix3, Point3};
 use needlebench_geometry::TriangleMesh;
 use needlebench_geometry::mesh::extent_m;
 use needlebench_imaging::markers::{DetectedMarker, Found, MarkerModel, Options, find_markers};
-use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_labels};
 use needlebench_imaging::registration::{
     MarkerMatch, MatchOptions, ReferenceFrame, ReferenceMarker, Registration, TargetError,
     match_markers, register_weighted,
 };
 use needlebench_imaging::{
-    AssumedBody, BesideKind, FieldOfView, ImagingError, LabelFacts, LabelMap, LesionSeed, Outside,
-    ReconstructOptions, Reconstruction, Remark, Surface, SurfaceSizes, SurfaceTissue, Volume,
-    VoxelGrid, in_order, reconstruct, resample, resample_labels, structure_of,
+    AssumedBody, FieldOfView, LabelFacts, LesionSeed, Outside, ReconstructOptions, Reconstruction,
+    Surface, SurfaceSizes, reconstruct,
 };
 use needlebench_scenario::scenario::PartTissue;
+use needlebench_volume::read::{Description, ReadOptions, ReadVolume, read_labels};
+use needlebench_volume::{
+    BesideKind, LabelMap, Remark, SurfaceTissue, Volume, VolumeError, VoxelGrid, in_order,
+    resample, resample_labels, structure_of,
+};
 use serde::Serialize;
 
 use super::digest::voxels_sha256;
@@ -151,7 +154,7 @@ pub fn build(
     read: ReadVolume,
     options: &BuildOptions,
     control: &Control<'_>,
-) -> Result<ScanBuild, ImagingError> {
+) -> Result<ScanBuild, VolumeError> {
     let seen = Arc::new(see(read, options, control)?);
     register(seen, options)
 }
@@ -161,7 +164,7 @@ pub(super) fn see(
     read: ReadVolume,
     options: &BuildOptions,
     control: &Control<'_>,
-) -> Result<SeenScan, ImagingError> {
+) -> Result<SeenScan, VolumeError> {
     let Control {
         threads,
         cancel,
@@ -200,10 +203,10 @@ pub(super) fn see(
         // Other programs see the file's voxels; ours are in `volume.nii.gz`.
         match on(&of_file) {
             Ok(map) => resample_labels(&map, &volume.grid, threads, cancel),
-            Err(ImagingError::Interrupted) => Err(ImagingError::Interrupted),
+            Err(VolumeError::Interrupted) => Err(VolumeError::Interrupted),
             Err(refused) => on(&volume.grid).map_err(|error| match error {
-                ImagingError::Interrupted => error,
-                ImagingError::Refused { .. } => refused,
+                VolumeError::Interrupted => error,
+                VolumeError::Refused { .. } => refused,
             }),
         }
     });
@@ -316,7 +319,7 @@ pub(super) fn part_tissue(tissue: SurfaceTissue) -> PartTissue {
 pub(super) fn register(
     seen: Arc<SeenScan>,
     options: &BuildOptions,
-) -> Result<ScanBuild, ImagingError> {
+) -> Result<ScanBuild, VolumeError> {
     let mut remarks = seen.remarks.clone();
     let registered = match (&seen.markers, &options.markers) {
         (Some(found), Some(known)) => Some(registered(found, known, &mut remarks)?),
@@ -365,11 +368,11 @@ fn labels_of(
     options: &ReadOptions,
     control: &Control<'_>,
     remarks: &mut Vec<Remark>,
-) -> Result<LabelMap, ImagingError> {
+) -> Result<LabelMap, VolumeError> {
     let place = given.file.display().to_string();
-    let within = |error: ImagingError| match &error {
+    let within = |error: VolumeError| match &error {
         // A file of a folder, or an element of the file.
-        ImagingError::Refused {
+        VolumeError::Refused {
             place: Some(inner), ..
         } => {
             let place = format!("{place}: {inner}");
@@ -399,7 +402,7 @@ fn labels_of(
             .names
             .iter()
             .map(|(label, name)| format!("{label} `{name}`"));
-        return Err(ImagingError::refused(format!(
+        return Err(VolumeError::refused(format!(
             "none of its labels has a name with a known meaning: {}",
             names.take(8).collect::<Vec<_>>().join(", ")
         ))
@@ -413,7 +416,7 @@ fn registered(
     found: &Found,
     known: &KnownMarkers,
     remarks: &mut Vec<Remark>,
-) -> Result<Registered, ImagingError> {
+) -> Result<Registered, VolumeError> {
     let detected: Vec<_> = found
         .markers
         .iter()
@@ -453,13 +456,13 @@ fn registered(
 }
 
 /// How many were found belongs to what is said of a match that there is not.
-fn with_found(error: ImagingError, found: &Found) -> ImagingError {
+fn with_found(error: VolumeError, found: &Found) -> VolumeError {
     match error {
-        ImagingError::Refused {
+        VolumeError::Refused {
             place,
             message,
             hint,
-        } => ImagingError::Refused {
+        } => VolumeError::Refused {
             place: place.or_else(|| Some("markers".to_owned())),
             message: format!("{message}; {} were found in the scan", found.markers.len()),
             hint: hint.or_else(|| {
@@ -470,7 +473,7 @@ fn with_found(error: ImagingError, found: &Found) -> ImagingError {
                 )
             }),
         },
-        other @ ImagingError::Interrupted => other,
+        other @ VolumeError::Interrupted => other,
     }
 }
 

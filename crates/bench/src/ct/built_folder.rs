@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_imaging::read::{ReadOptions, read_label_names, read_labels, read_volume};
 use needlebench_imaging::registration::{ReferenceFrame, Registration};
-use needlebench_imaging::{ImagingError, LabelMap, SurfaceTissue, Volume, VoxelGrid};
 use needlebench_input::{Finding, read_text, sha256_hex};
 use needlebench_scenario::scenario::{LengthUnit, Scenario};
+use needlebench_volume::read::{ReadOptions, read_label_names, read_labels, read_volume};
+use needlebench_volume::{LabelMap, SurfaceTissue, Volume, VolumeError, VoxelGrid};
 use serde::Deserialize;
 
 use super::digest::voxels_sha256;
@@ -173,7 +173,7 @@ impl BuiltFolder {
         let facts = read_facts(&path).map_err(|error| Stop::of_scan(&path, error.hint(BUILD)))?;
         let grid = VoxelGrid::aligned(facts.size, facts.spacing_m, facts.first_voxel_m.into())
             .map_err(|error| {
-                Stop::of_scan(&path, ImagingError::refused(error.to_string()).at("size"))
+                Stop::of_scan(&path, VolumeError::refused(error.to_string()).at("size"))
             })?;
         check_surfaces(folder, &facts)?;
         Ok(Self {
@@ -259,7 +259,7 @@ impl BuiltFolder {
     pub fn volume(&self, cancel: &AtomicBool) -> Result<Volume, Stop> {
         let path = self.folder.join(VOLUME_FILE);
         if !path.is_file() {
-            let error = ImagingError::refused("no volume to show").hint(
+            let error = VolumeError::refused("no volume to show").hint(
                 "build the folder without --no-volume: `needlebench ct build SCAN --out DIR`",
             );
             return Err(Stop::of_scan(&path, error));
@@ -279,7 +279,7 @@ impl BuiltFolder {
         };
         if let Some(other) = other {
             let message = format!("not the volume of {REPORT_FILE}: {other}");
-            let error = ImagingError::refused(message).hint(BUILD_ANEW);
+            let error = VolumeError::refused(message).hint(BUILD_ANEW);
             return Err(Stop::of_scan(&path, error));
         }
         volume.grid = self.labels.grid.clone();
@@ -343,17 +343,17 @@ pub(super) fn check_patient(
 }
 
 /// The report at a path.
-pub(super) fn read_facts(path: &Path) -> Result<BuildFacts, ImagingError> {
-    let text = read_text(path).map_err(|error| ImagingError::refused(error.to_string()))?;
+pub(super) fn read_facts(path: &Path) -> Result<BuildFacts, VolumeError> {
+    let text = read_text(path).map_err(|error| VolumeError::refused(error.to_string()))?;
     let mut facts: BuildFacts = serde_json::from_str(&text)
-        .map_err(|error| ImagingError::refused(format!("not written by `ct build`: {error}")))?;
+        .map_err(|error| VolumeError::refused(format!("not written by `ct build`: {error}")))?;
     facts.sha256 = sha256_hex(text.as_bytes());
     if facts.schema_version == VERSION {
         return Ok(facts);
     }
     let version = facts.schema_version;
     Err(
-        ImagingError::refused(format!("version {version}, supported is {VERSION}"))
+        VolumeError::refused(format!("version {version}, supported is {VERSION}"))
             .at("schema_version"),
     )
 }
@@ -367,7 +367,7 @@ fn labels(
 ) -> Result<LabelMap, Stop> {
     let path = folder.join(LABELS_FILE);
     if !path.is_file() {
-        let error = ImagingError::refused("no label map")
+        let error = VolumeError::refused("no label map")
             .hint("build the folder without --no-labels: `needlebench ct build SCAN --out DIR`");
         return Err(Stop::of_scan(&path, error));
     }
@@ -375,7 +375,7 @@ fn labels(
         .map_err(|error| Stop::of_scan(&path, error))?;
     let labels = read.labels.labels;
     if facts.labels_sha256.as_deref() != Some(&voxels_sha256(&labels, u16::to_le_bytes)) {
-        let error = ImagingError::refused(format!("not the label map of {REPORT_FILE}"));
+        let error = VolumeError::refused(format!("not the label map of {REPORT_FILE}"));
         return Err(Stop::of_scan(&path, error.hint(BUILD_ANEW)));
     }
     let names = folder.join(NAMES_FILE);
@@ -396,7 +396,7 @@ fn check_surfaces(folder: &Path, facts: &BuildFacts) -> Result<(), Stop> {
         let size = path.metadata().map(|metadata| metadata.len());
         if size.ok() != Some(HEAD + TRIANGLE * surface.triangles) {
             let message = format!("not the surface `{}` of {REPORT_FILE}", surface.name);
-            let error = ImagingError::refused(message).hint(BUILD_ANEW);
+            let error = VolumeError::refused(message).hint(BUILD_ANEW);
             return Err(Stop::of_scan(&path, error));
         }
     }

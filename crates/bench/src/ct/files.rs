@@ -2,11 +2,10 @@
 
 use needlebench_geometry::mesh::volume_m3;
 use needlebench_imaging::markers::{DetectedMarker, Rejected};
-use needlebench_imaging::read::Description;
 use needlebench_imaging::registration::{MarkerMatch, Registration};
-use needlebench_imaging::{
-    LabelFacts, LabelMap, LesionSize, Outside, Remark, SurfaceError, SurfaceTissue,
-};
+use needlebench_imaging::{LabelFacts, LesionSize, Outside, SurfaceError};
+use needlebench_volume::read::Description;
+use needlebench_volume::{LabelMap, Remark, SurfaceTissue};
 use serde::Serialize;
 
 use super::overview::OverviewRow;

@@ -5,16 +5,17 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use needlebench_imaging::LesionSeed;
 use needlebench_imaging::markers::MarkerModel;
-use needlebench_imaging::read::{Description, ReadVolume};
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker};
-use needlebench_imaging::{ImagingError, LesionSeed};
 use needlebench_input::{Finding, nearest_name};
 use needlebench_kinematics::Pose;
 use needlebench_phantom::Phantom;
 use needlebench_scenario::scenario::{CtSection, GoalSection, MarkerKind, ScanKernel, ScanSlices};
 use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
 use needlebench_synthesis::{Kernel, Noise, ScanPreset, Scanner, Streaks, synthesise_watched};
+use needlebench_volume::VolumeError;
+use needlebench_volume::read::{Description, ReadVolume};
 
 use super::build::{BuildOptions, KnownMarkers, ScanBuild, SeenScan, register, see};
 use super::files::BuildFiles;
@@ -70,7 +71,7 @@ fn seen(
     scan: &SyntheticScan,
     options: &BuildOptions,
     control: &Control<'_>,
-) -> Result<SeenScan, ImagingError> {
+) -> Result<SeenScan, VolumeError> {
     control.progress.message("scanning");
     control.progress.expect(scan.grid.size()[2] as u64);
     let volume = synthesise_watched(
@@ -150,7 +151,7 @@ pub fn imaged(
     if truth.exists() {
         // That of another scan is no truth of this one.
         std::fs::remove_file(&truth).map_err(|error| {
-            let refused = ImagingError::refused(format!("cannot be replaced: {error}"));
+            let refused = VolumeError::refused(format!("cannot be replaced: {error}"));
             Stop::of_scan(&truth, refused)
         })?;
     }
@@ -334,7 +335,7 @@ fn goals(
     resolved: &ResolvedScenario,
     scan: &SyntheticScan,
     build: &ScanBuild,
-) -> Result<Vec<GoalSection>, ImagingError> {
+) -> Result<Vec<GoalSection>, VolumeError> {
     let frame = PatientFrame::of(build);
     let true_robot_from_ct = scan.robot_from_ct.unwrap_or_else(Pose::identity);
     let placed = resolved.phantom.as_ref();
@@ -350,7 +351,7 @@ fn goals(
             if let Some(own) = not_grown.find(|each| each.name == name) {
                 return Err(own.error.clone());
             }
-            return Err(ImagingError::refused(format!(
+            return Err(VolumeError::refused(format!(
                 "lesion `{name}` is not visible in the scan"
             ))
             .at(format!("goal `{}`", goal.name))

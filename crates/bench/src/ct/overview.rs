@@ -1,11 +1,10 @@
 //! What was found in a scan at a glance: how much of it, from what, how accurate, and what is not known.
 
 use needlebench_cell::part_in_words;
-use needlebench_imaging::{
-    AssumedBody, BesideKind, Label, LabelFacts, Surface, SurfaceTissue, structure_of,
-};
+use needlebench_imaging::{AssumedBody, Label, LabelFacts, Surface};
 use needlebench_routing::Obstacle;
 use needlebench_scenario::scenario::{NeedleRouteSection, RouteSection};
+use needlebench_volume::{BesideKind, SurfaceTissue, structure_of};
 use serde::{Deserialize, Serialize};
 
 use super::{Registered, ScanBuild};

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use needlebench_geometry::mesh::extent_m;
+use needlebench_imaging::Surface;
 use needlebench_imaging::registration::ReferenceFrame;
-use needlebench_imaging::{BesideKind, Remark, Surface, SurfaceTissue};
 use needlebench_kinematics::Pose;
 use needlebench_phantom::Tissue;
 use needlebench_scenario::ResolvedScenario;
@@ -13,6 +13,7 @@ use needlebench_scenario::scenario::{
     BuildSection, CovarianceMm2, CutSection, GoalSection, ImagingBlock, PartSection, PartTissue,
     PhantomSection, RegistrationBlock, Scenario,
 };
+use needlebench_volume::{BesideKind, Remark, SurfaceTissue};
 
 use super::ScanBuild;
 use super::build::part_tissue;

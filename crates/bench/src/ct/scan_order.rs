@@ -4,11 +4,11 @@ use std::path::Path;
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use needlebench_geometry::{Shape, Solid};
-use needlebench_imaging::{ImagingError, VoxelGrid};
 use needlebench_kinematics::Pose;
 use needlebench_phantom::{Phantom, PhantomPart};
 use needlebench_scenario::ResolvedScenario;
 use needlebench_synthesis::{Scanner, Scene};
+use needlebench_volume::{VolumeError, VoxelGrid};
 
 use super::truth::{lesions, markers, rows_of_grid, rows_of_pose};
 use super::{Materials, ScanTruth, phantom_scene};
@@ -132,7 +132,7 @@ const BED_HALF_M: [f64; 2] = [0.21, 1.2];
 
 impl SyntheticScan {
     /// Lays the subject on the bed and the slices through it.
-    pub fn new(subject: &CtSubject<'_>, order: &ScanOrder) -> Result<Self, ImagingError> {
+    pub fn new(subject: &CtSubject<'_>, order: &ScanOrder) -> Result<Self, VolumeError> {
         let pose = Posed::new(subject, order);
         let mut scene = phantom_scene(subject.phantom, subject.limbs, &order.materials)
             .moved(&pose.ct_from_phantom);
@@ -218,7 +218,7 @@ impl Posed {
 
 impl ScanOrder {
     /// The slices through a body of this extent in `ct`.
-    fn grid(&self, (low, high): &(Vector3<f64>, Vector3<f64>)) -> Result<VoxelGrid, ImagingError> {
+    fn grid(&self, (low, high): &(Vector3<f64>, Vector3<f64>)) -> Result<VoxelGrid, VolumeError> {
         let middle = 0.5 * (low + high);
         let reach_m = 0.5 * (high - low).xy().max() + BESIDE_M;
         let pixel_m = self
@@ -230,7 +230,7 @@ impl ScanOrder {
         };
         let slices = ((to_m - from_m) / self.increment_m).ceil().max(1.0);
         if !slices.is_finite() || slices > f64::from(u16::MAX) {
-            return Err(ImagingError::refused(format!(
+            return Err(VolumeError::refused(format!(
                 "{slices} slices from {:.1} to {:.1} mm with spacing {} mm; at most 65535",
                 1e3 * from_m,
                 1e3 * to_m,
@@ -258,7 +258,7 @@ impl ScanOrder {
             steps_m,
             Point3::from(first_m),
         )
-        .map_err(|error| ImagingError::refused(format!("invalid slices: {error}")))
+        .map_err(|error| VolumeError::refused(format!("invalid slices: {error}")))
     }
 }
 

@@ -1,10 +1,10 @@
 //! What is known of a synthetic scan.
 
 use nalgebra::Point3;
-use needlebench_imaging::VoxelGrid;
 use needlebench_kinematics::Pose;
 use needlebench_phantom::Phantom;
 use needlebench_synthesis::Scanner;
+use needlebench_volume::VoxelGrid;
 use serde::Serialize;
 
 use super::Materials;

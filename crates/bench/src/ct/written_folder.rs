@@ -4,13 +4,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use needlebench_geometry::TriangleMesh;
-use needlebench_imaging::write::{
-    TEMPORARY_PREFIX, write_bytes, write_label_nifti, write_nifti, write_seg_nrrd,
-};
-use needlebench_imaging::{ImagingError, Remark, stl_bytes};
+use needlebench_imaging::stl_bytes;
 use needlebench_input::{from_toml, read_text, sha256_hex};
 use needlebench_scenario::scenario::{BuildSection, GoalSection};
 use needlebench_scenario::scenario_text;
+use needlebench_volume::write::{
+    TEMPORARY_PREFIX, write_bytes, write_label_nifti, write_nifti, write_seg_nrrd,
+};
+use needlebench_volume::{Remark, VolumeError};
 use serde::{Deserialize, Serialize};
 
 use super::ScanBuild;
@@ -72,7 +73,7 @@ pub fn write_patient<'b>(
 ) -> Result<WrittenPatient<'b>, Stop> {
     control.progress.message("writing");
     let scenario = folder.join(SCENARIO_FILE);
-    let written = || -> Result<_, ImagingError> {
+    let written = || -> Result<_, VolumeError> {
         let aside = tempfile::Builder::new()
             .prefix(TEMPORARY_PREFIX)
             .suffix(".tmp")
@@ -100,7 +101,7 @@ pub fn write_patient<'b>(
         };
         let sha256 = section.sha256.clone();
         let patient = patient_scenario(room, build, goals, section, folder, is_couch_left_out);
-        let patient = scenario_text(&patient).map_err(ImagingError::refused)?;
+        let patient = scenario_text(&patient).map_err(VolumeError::refused)?;
         let patient = format!("# {first}\n{patient}");
         write_bytes(&aside.join(SCENARIO_FILE), patient.as_bytes())?;
         write_bytes(&aside.join(REPORT_FILE), text.as_bytes())?;
@@ -116,23 +117,23 @@ pub fn write_patient<'b>(
     })
 }
 
-fn not_written(path: &Path, error: &io::Error) -> ImagingError {
-    ImagingError::refused(format!("cannot be written: {error}")).at(path.display().to_string())
+fn not_written(path: &Path, error: &io::Error) -> VolumeError {
+    VolumeError::refused(format!("cannot be written: {error}")).at(path.display().to_string())
 }
 
 /// Writes a JSON document.
-pub(super) fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), ImagingError> {
+pub(super) fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), VolumeError> {
     write_bytes(path, json(value)?.as_bytes())
 }
 
-fn json<T: Serialize>(value: &T) -> Result<String, ImagingError> {
+fn json<T: Serialize>(value: &T) -> Result<String, VolumeError> {
     serde_json::to_string_pretty(value)
         .map(|text| format!("{text}\n"))
-        .map_err(|error| ImagingError::refused(error.to_string()))
+        .map_err(|error| VolumeError::refused(error.to_string()))
 }
 
 /// Of what the scenario has that is not of the scan.
-fn room_sha256(room: &Room<'_>, goals: &[GoalSection]) -> Result<String, ImagingError> {
+fn room_sha256(room: &Room<'_>, goals: &[GoalSection]) -> Result<String, VolumeError> {
     json(&(room.scenario, goals)).map(|text| sha256_hex(text.as_bytes()))
 }
 
@@ -152,7 +153,7 @@ fn pieces_of(build: &ScanBuild) -> impl Iterator<Item = (&str, &TriangleMesh)> {
 fn surfaces<'m>(
     folder: &Path,
     surfaces: impl Iterator<Item = (&'m str, &'m TriangleMesh)>,
-) -> Result<Vec<String>, ImagingError> {
+) -> Result<Vec<String>, VolumeError> {
     let written = surfaces.map(|(name, mesh)| {
         let bytes = stl_bytes(mesh)?;
         write_bytes(&folder.join(surface_file(name)), &bytes)?;
@@ -167,7 +168,7 @@ fn images(
     build: &ScanBuild,
     wanted: &BuildFiles,
     control: &Control<'_>,
-) -> Result<(), ImagingError> {
+) -> Result<(), VolumeError> {
     if wanted.labels {
         let labels = &build.seen.made.labels;
         write_label_nifti(&folder.join(LABELS_FILE), labels, control.cancel)?;

@@ -20,8 +20,6 @@ mod report;
 
 use std::sync::Arc;
 
-use needlebench_imaging::BesideKind;
-use needlebench_imaging::ImagingError;
 use needlebench_input::Finding;
 use needlebench_parallel::in_parallel;
 use needlebench_phantom::Phantom;
@@ -31,6 +29,7 @@ use needlebench_routing::{
 };
 use needlebench_scenario::scenario::{GoalSection, RouteSection};
 use needlebench_scenario::{GoalPlacer, ResolvedScenario};
+use needlebench_volume::{BesideKind, VolumeError};
 
 use crate::Control;
 use crate::ct::BuiltFolder;
@@ -74,7 +73,7 @@ pub enum WithRobot {
 pub enum VoxelsError {
     /// The scan has no such place, or it was interrupted.
     #[error(transparent)]
-    Scan(#[from] ImagingError),
+    Scan(#[from] VolumeError),
     /// The goal has no target.
     #[error("{0}")]
     Target(Finding),

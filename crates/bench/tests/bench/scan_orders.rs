@@ -6,9 +6,10 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_bench::Control;
 use needlebench_bench::ct::{BuildOptions, GivenLabels, ScanBuild, build};
 use needlebench_bench::progress::Silent;
-use needlebench_imaging::read::{Description, ReadVolume};
-use needlebench_imaging::write::write_label_nifti;
-use needlebench_imaging::{AIR_HU, LabelMap, LesionSeed, Volume, VoxelGrid};
+use needlebench_imaging::LesionSeed;
+use needlebench_volume::read::{Description, ReadVolume};
+use needlebench_volume::write::write_label_nifti;
+use needlebench_volume::{AIR_HU, LabelMap, Volume, VoxelGrid};
 
 const SPACING_MM: [f64; 3] = [3.0, 3.0, 4.0];
 const SIZE: [usize; 3] = [90, 70, 50];

@@ -1,14 +1,12 @@
 //! What is in the scan and not of the patient's trunk: arms, the couch, cushions.
 
 use nalgebra::Point3;
+use needlebench_volume::{BesideKind, Lying, Remark, VolumeError};
 
 use crate::components::{Component, Components, Connectivity};
-use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::dilated;
-use crate::patient_position::Lying;
 use crate::spacing::whole;
-use crate::structures::BesideKind;
 
 use super::body::Body;
 use super::{Scan, couch};
@@ -70,7 +68,7 @@ pub(super) fn find(
     unseen: Option<&Mask>,
     lying: Lying,
     remarks: &mut Vec<Remark>,
-) -> Result<Vec<Beside>, ImagingError> {
+) -> Result<Vec<Beside>, VolumeError> {
     let mut dense = Mask::of(scan.size(), &scan.volume.hu, |hu| hu > SHELL_HU);
     // The blur of the skin is not beside it.
     let layer_m = SKIN_VOXELS * scan.spacing_m.into_iter().fold(0.0, f64::max);

@@ -1,11 +1,9 @@
 //! Label maps of what was found.
 
+use needlebench_volume::{BesideKind, LabelMap, Volume};
 use serde::Serialize;
 
 use crate::mask::{IndexBox, Mask};
-use crate::structures::BesideKind;
-use crate::volume::LabelMap;
-use crate::volume::Volume;
 
 use super::{Lesion, Segmentation, Side};
 

@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 use needlebench_geometry::TriangleMesh;
-
-use crate::ImagingError;
+use needlebench_volume::VolumeError;
 
 /// Bytes of text before the number of triangles.
 const HEAD_BYTES: usize = 80;
@@ -15,9 +14,9 @@ const TRIANGLE_BYTES: usize = 50;
 ///
 /// # Errors
 /// More triangles than the format can count.
-pub fn stl_bytes(mesh: &TriangleMesh) -> Result<Vec<u8>, ImagingError> {
+pub fn stl_bytes(mesh: &TriangleMesh) -> Result<Vec<u8>, VolumeError> {
     let count = u32::try_from(mesh.triangles.len())
-        .map_err(|_| ImagingError::refused("more than 2^32 triangles, the most of an STL file"))?;
+        .map_err(|_| VolumeError::refused("more than 2^32 triangles, the most of an STL file"))?;
     let mut bytes = Vec::with_capacity(HEAD_BYTES + 4 + TRIANGLE_BYTES * mesh.triangles.len());
     bytes.extend_from_slice(b"binary STL, mm, axes left posterior superior");
     bytes.resize(HEAD_BYTES, 0);

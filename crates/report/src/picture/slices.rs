@@ -6,8 +6,8 @@
 use nalgebra::{Point3, Vector3};
 use needlebench_bench::ct::ScanBuild;
 use needlebench_geometry::TriangleMesh;
-use needlebench_imaging::{SurfaceTissue, Volume};
 use needlebench_render::{Image, PictureError, TextSize};
+use needlebench_volume::{SurfaceTissue, Volume};
 
 /// A picture and the name of its file.
 #[derive(Debug, Clone, PartialEq, Eq)]

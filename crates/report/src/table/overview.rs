@@ -112,7 +112,7 @@ pub(crate) fn accuracy_mm(accuracy: OverviewAccuracy) -> String {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_imaging::SurfaceTissue;
+    use needlebench_volume::SurfaceTissue;
 
     use super::*;
 

@@ -13,7 +13,6 @@ use needlebench_bench::ct::{
 };
 use needlebench_bench::{Control, Stop};
 use needlebench_imaging::markers::MarkerModel;
-use needlebench_imaging::read::{ReadVolume, read_label_names};
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker, Registration};
 use needlebench_imaging::{AssumedBody, Label, LesionSeed, Outside, SurfaceSizes};
 use needlebench_input::Finding;
@@ -24,6 +23,7 @@ use needlebench_scenario::{
     MarkerFrame, MarkerList, Overrides, load_open_scenario, name_from_file, resolve_open_scenario,
 };
 use needlebench_show::layout;
+use needlebench_volume::read::{ReadVolume, read_label_names};
 use serde::Serialize;
 
 use super::info::ReadArguments;

@@ -13,7 +13,6 @@ use needlebench_bench::routes::{
 };
 use needlebench_bench::suggest::SuggestError;
 use needlebench_bench::{Control, Stop};
-use needlebench_imaging::Remark;
 use needlebench_input::{Finding, read_text};
 use needlebench_report::files::{Folder, write_route_maps};
 use needlebench_report::table::overview::unlabelled_text;
@@ -24,6 +23,7 @@ use needlebench_scenario::{
     OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, load_open_scenario, resolve_scenario,
 };
 use needlebench_show::layout;
+use needlebench_volume::Remark;
 use serde::Serialize;
 
 use crate::arguments::{PicturesArguments, RobotArguments};
