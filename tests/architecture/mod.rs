@@ -190,6 +190,7 @@ const LAYERS: [(&str, &[&str]); 35] = [
             "cell",
             "input",
             "kinematics",
+            "parallel",
         ],
     ),
     (
@@ -205,6 +206,7 @@ const LAYERS: [(&str, &[&str]); 35] = [
             "input",
             "kinematics",
             "numerics",
+            "parallel",
         ],
     ),
     (
@@ -233,6 +235,7 @@ const LAYERS: [(&str, &[&str]); 35] = [
             "cell",
             "input",
             "kinematics",
+            "parallel",
         ],
     ),
     (
@@ -250,6 +253,7 @@ const LAYERS: [(&str, &[&str]); 35] = [
             "cell",
             "input",
             "kinematics",
+            "parallel",
         ],
     ),
 ];

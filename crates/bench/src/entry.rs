@@ -4,13 +4,12 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Point3;
+use needlebench_parallel::{Control, Silent};
 use needlebench_phantom::Phantom;
 use needlebench_routing::RouteRules;
 use needlebench_scenario::scenario::{GoalSection, NeedleRouteSection, RouteSection};
 use needlebench_scenario::{ChooseEntry, ChosenEntry, GoalPlacer, NoEntry, ResolvedScenario};
 
-use crate::Control;
-use crate::progress::Silent;
 use crate::routes::{FreeRoutes, RouteTask, SOLID_DIRECTIONS, WithRobot, free_routes};
 use crate::suggest::{SuggestError, suggest_entries};
 

@@ -15,6 +15,7 @@ use needlebench_imaging::{
     AssumedBody, FieldOfView, LabelFacts, LesionSeed, Outside, ReconstructOptions, Reconstruction,
     Surface, SurfaceSizes, reconstruct,
 };
+use needlebench_parallel::Control;
 use needlebench_scenario::scenario::PartTissue;
 use needlebench_volume::read::{Description, ReadOptions, ReadVolume, read_labels};
 use needlebench_volume::{
@@ -24,7 +25,6 @@ use needlebench_volume::{
 use serde::Serialize;
 
 use super::digest::voxels_sha256;
-use crate::Control;
 
 /// Markers whose places are known apart from the scan.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,6 +10,7 @@ use needlebench_imaging::markers::MarkerModel;
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker};
 use needlebench_input::{Finding, nearest_name};
 use needlebench_kinematics::Pose;
+use needlebench_parallel::{Control, Silent};
 use needlebench_phantom::Phantom;
 use needlebench_scenario::scenario::{CtSection, GoalSection, MarkerKind, ScanKernel, ScanSlices};
 use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};
@@ -23,9 +24,7 @@ use super::patient::{PatientFrame, Room};
 use super::touched::Draws;
 use super::written_folder::{SetAside, WrittenPatient, write_json, write_patient};
 use super::{CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan};
-use crate::Control;
 use crate::Stop;
-use crate::progress::Silent;
 
 /// A scenario whose phantom was scanned.
 #[derive(Debug)]

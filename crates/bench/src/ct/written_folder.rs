@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use needlebench_geometry::TriangleMesh;
 use needlebench_imaging::stl_bytes;
 use needlebench_input::{from_toml, read_text, sha256_hex};
+use needlebench_parallel::Control;
 use needlebench_scenario::scenario::{BuildSection, GoalSection};
 use needlebench_scenario::scenario_text;
 use needlebench_volume::write::{
@@ -21,7 +22,7 @@ use super::files::{
     ROUTES_FILE, SCENARIO_FILE, SEGMENTATION_FILE, SESSION_FILE, SLICES, VOLUME_FILE,
 };
 use super::patient::{Room, SURFACES, couch_left_out, patient_scenario, surface_file};
-use crate::{Control, Stop};
+use crate::Stop;
 
 /// A patient whose folder was written.
 #[derive(Debug)]

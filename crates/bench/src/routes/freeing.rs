@@ -5,7 +5,7 @@ use std::path::Path;
 
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
 use needlebench_planning::Planner;
 use needlebench_scenario::scenario::GoalSection;
 use needlebench_scenario::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting};
@@ -13,7 +13,6 @@ use needlebench_scenario::{Change, KeyPath, Overrides, ResolvedScenario, Scenari
 use super::RouteTask;
 use super::joint::ROLLS;
 use super::report::{Freed, Freeing, RoutePlan};
-use crate::Control;
 use crate::suggest::SuggestError;
 
 /// Step of a base or a table that is moved, mm.

@@ -6,7 +6,7 @@ use needlebench_evaluation::judge_posture;
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_evaluation::room::RoomModel;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
 use needlebench_planning::{Candidate, Member, Merit, Planner, judge_route};
 use needlebench_routing::{Obstacle, RouteRules};
 use needlebench_scenario::scenario::GoalSection;
@@ -15,7 +15,6 @@ use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
 use serde::Serialize;
 
 use super::{Rounded, RouteTask};
-use crate::Control;
 use crate::real_cell::servo_of;
 use crate::suggest::SuggestError;
 

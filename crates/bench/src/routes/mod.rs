@@ -21,7 +21,7 @@ mod report;
 use std::sync::Arc;
 
 use needlebench_input::Finding;
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
 use needlebench_phantom::Phantom;
 use needlebench_routing::{
     Anatomy, Route, RouteRules, Searched, SolidAnatomy, VoxelAnatomy, VoxelOptions, angles_rad,
@@ -31,7 +31,6 @@ use needlebench_scenario::scenario::{GoalSection, RouteSection};
 use needlebench_scenario::{GoalPlacer, ResolvedScenario};
 use needlebench_volume::{BesideKind, VolumeError};
 
-use crate::Control;
 use crate::ct::BuiltFolder;
 use crate::suggest::SuggestError;
 use joint::{Asked, Served, ask, ask_until};

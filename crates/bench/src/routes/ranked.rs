@@ -1,11 +1,11 @@
 //! What `run` makes of a chosen route: routes and runs rank configurations by one code.
 
 use needlebench_engine::ENGINES;
+use needlebench_parallel::Control;
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::scenario::EngineName;
 
 use super::RoutePlan;
-use crate::Control;
 use crate::run::run;
 use crate::runnable::Runnable;
 use crate::scenario_run::RunOptions;

@@ -15,7 +15,7 @@ use std::f64::consts::FRAC_PI_3;
 
 use nalgebra::Point3;
 use needlebench_clearance::ClearanceModel;
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
 use needlebench_planning::{Planner, crossed_fissures, judged_tissues};
 use needlebench_scenario::scenario::GoalSection;
 use needlebench_scenario::{Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction};
@@ -24,7 +24,6 @@ use serde::Serialize;
 
 use super::grid::{around, directions};
 use super::{Refused, SuggestError, counted};
-use crate::control::Control;
 use crate::preview::{ConfigurationPreview, goal_preview};
 use crate::study::planned_rows;
 

@@ -8,8 +8,9 @@ use needlebench_bench::suggest::{
     EntrySearch, PlaceSearch, SuggestError, at_place, plan_entry, plan_place, suggest_entries,
     suggest_places,
 };
-use needlebench_bench::{Control, Preview, Runnable, Stop};
+use needlebench_bench::{Preview, Runnable, Stop};
 use needlebench_input::{Finding, nearest_name, read_text};
+use needlebench_parallel::Control;
 use needlebench_report::files::{Folder, write_suggestions};
 use needlebench_report::table::suggest::{entries_text, places_text};
 use needlebench_report::write_atomically;

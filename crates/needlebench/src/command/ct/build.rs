@@ -7,15 +7,16 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point3, Vector3};
+use needlebench_bench::Stop;
 use needlebench_bench::ct::{
     BuildFiles, BuildOptions, BuildReport, GivenLabels, KnownMarkers, PatientFrame, Registered,
     Room, SLICES, ScanBuild, SetAside, WrittenPatient, build, write_patient,
 };
-use needlebench_bench::{Control, Stop};
 use needlebench_imaging::markers::MarkerModel;
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker, Registration};
 use needlebench_imaging::{AssumedBody, Label, LesionSeed, Outside, SurfaceSizes};
 use needlebench_input::Finding;
+use needlebench_parallel::Control;
 use needlebench_report::picture::{OVERVIEW, SlicePicture, scan_pictures};
 use needlebench_report::table::overview::overview_text;
 use needlebench_scenario::scenario::{GoalSection, Posture, Target};

@@ -9,8 +9,8 @@ use nalgebra::Vector3;
 use needlebench_bench::ct::{
     CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan, marker_list,
 };
-use needlebench_bench::progress::Progress;
 use needlebench_input::{FileKind, Finding, read_text};
+use needlebench_parallel::Progress;
 use needlebench_phantom::{Phantom, PhantomParameters, SIZE_PRESETS};
 use needlebench_report::write_atomically;
 use needlebench_scenario::scenario::MarkerKind;
