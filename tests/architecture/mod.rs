@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Every crate under `crates/`, the Python package, and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 35] = [
+const LAYERS: [(&str, &[&str]); 36] = [
     ("elementary", &[]),
     ("parallel", &[]),
     ("numerics", &[]),
@@ -104,14 +104,34 @@ const LAYERS: [(&str, &[&str]); 35] = [
     ),
     ("credibility", &["show", "evaluation", "engine", "input"]),
     (
-        "bench",
+        "patient",
         &[
-            "iso9283",
             "synthesis",
             "evaluation",
             "routing",
             "imaging",
             "volume",
+            "uncertainty",
+            "engine",
+            "planning",
+            "clearance",
+            "scenario",
+            "phantom",
+            "cell",
+            "input",
+            "geometry",
+            "kinematics",
+            "numerics",
+            "parallel",
+        ],
+    ),
+    (
+        "bench",
+        &[
+            "iso9283",
+            "evaluation",
+            "patient",
+            "routing",
             "urscript",
             "recorded",
             "study",
@@ -135,6 +155,7 @@ const LAYERS: [(&str, &[&str]); 35] = [
         "export",
         &[
             "bench",
+            "patient",
             "evaluation",
             "ros",
             "engine",
@@ -154,6 +175,7 @@ const LAYERS: [(&str, &[&str]); 35] = [
             "show",
             "export",
             "bench",
+            "patient",
             "evaluation",
             "imaging",
             "volume",
@@ -181,6 +203,7 @@ const LAYERS: [(&str, &[&str]); 35] = [
         &[
             "report",
             "bench",
+            "patient",
             "evaluation",
             "routing",
             "volume",
@@ -221,11 +244,13 @@ const LAYERS: [(&str, &[&str]); 35] = [
             "report",
             "export",
             "bench",
+            "patient",
             "evaluation",
             "imaging",
             "volume",
             "recorded",
             "study",
+            "uncertainty",
             "engine",
             "planning",
             "clearance",
@@ -244,6 +269,7 @@ const LAYERS: [(&str, &[&str]); 35] = [
             "needlebench",
             "report",
             "bench",
+            "patient",
             "evaluation",
             "engine",
             "planning",

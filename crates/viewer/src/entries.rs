@@ -4,11 +4,11 @@
 
 use std::sync::{Arc, OnceLock};
 
-use needlebench_bench::routes::{
+use needlebench_parallel::Control;
+use needlebench_patient::SuggestError;
+use needlebench_patient::routes::{
     RoutePlan, RouteTask, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free_routes,
 };
-use needlebench_bench::suggest::SuggestError;
-use needlebench_parallel::Control;
 use needlebench_scenario::scenario::{GoalSection, RouteSection};
 use needlebench_volume::{Remark, VolumeError};
 use serde::Serialize;

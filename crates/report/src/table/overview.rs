@@ -1,6 +1,6 @@
 //! What was found in a scan, as a table.
 
-use needlebench_bench::ct::{OverviewAccuracy, OverviewRow, OverviewSource};
+use needlebench_patient::ct::{OverviewAccuracy, OverviewRow, OverviewSource};
 use needlebench_show::{CellAlignment, plain_table};
 
 /// Structures of one tissue of a label map that have a row each; more share one.

@@ -9,9 +9,9 @@ use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
 
 use nalgebra::Point3;
-use needlebench_bench::ct::{BuildFiles, BuildOptions, Room, USUAL_ROOM, build, write_patient};
 use needlebench_imaging::LesionSeed;
 use needlebench_parallel::{Control, Silent};
+use needlebench_patient::ct::{BuildFiles, BuildOptions, Room, USUAL_ROOM, build, write_patient};
 use needlebench_scenario::scenario::{GoalSection, Target};
 use needlebench_scenario::{Overrides, resolve_open_scenario};
 use needlebench_viewer::{Case, Server, Stopper};

@@ -6,8 +6,8 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
 use clap::Args;
-use needlebench_bench::Stop;
 use needlebench_input::Finding;
+use needlebench_patient::Stop;
 use needlebench_show::layout;
 use needlebench_volume::read::{Description, ReadOptions, ReadVolume, read_volume};
 use needlebench_volume::{HuHistogram, Orientation, Remark, VolumeError};

@@ -6,11 +6,11 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
-use needlebench_bench::ct::{
-    CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan, marker_list,
-};
 use needlebench_input::{FileKind, Finding, read_text};
 use needlebench_parallel::Progress;
+use needlebench_patient::ct::{
+    CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan, marker_list,
+};
 use needlebench_phantom::{Phantom, PhantomParameters, SIZE_PRESETS};
 use needlebench_report::write_atomically;
 use needlebench_scenario::scenario::MarkerKind;
@@ -255,7 +255,7 @@ struct Made<'m> {
     schema_version: u32,
     folder: String,
     files: Vec<String>,
-    truth: &'m needlebench_bench::ct::ScanTruth,
+    truth: &'m needlebench_patient::ct::ScanTruth,
 }
 
 #[derive(Debug, Serialize)]

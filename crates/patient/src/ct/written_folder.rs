@@ -22,7 +22,7 @@ use super::files::{
     ROUTES_FILE, SCENARIO_FILE, SEGMENTATION_FILE, SESSION_FILE, SLICES, VOLUME_FILE,
 };
 use super::patient::{Room, SURFACES, couch_left_out, patient_scenario, surface_file};
-use crate::Stop;
+use crate::stop::Stop;
 
 /// A patient whose folder was written.
 #[derive(Debug)]

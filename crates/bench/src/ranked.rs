@@ -2,21 +2,21 @@
 
 use needlebench_engine::ENGINES;
 use needlebench_parallel::Control;
+use needlebench_patient::SuggestError;
+use needlebench_patient::routes::RoutePlan;
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::scenario::EngineName;
 
-use super::RoutePlan;
 use crate::run::run;
 use crate::runnable::Runnable;
 use crate::scenario_run::RunOptions;
-use crate::suggest::SuggestError;
 
 /// Runs a scenario in the engine that is in process, and adds to the plan of one of its goals which configuration `run`
 /// recommends for it, and why.
 ///
 /// # Errors
 /// If the scenario has no such goal or cannot be run, or it was interrupted.
-pub fn rank(
+pub fn rank_route(
     planned: &ResolvedScenario,
     plan: &mut RoutePlan,
     control: &Control<'_>,

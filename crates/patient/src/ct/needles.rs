@@ -8,7 +8,7 @@ use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::scenario::Scenario;
 
 use super::built_folder::{BUILD, check_patient, read_facts};
-use crate::Stop;
+use crate::stop::Stop;
 
 /// The needles of a scenario, in `ct`: the patient coordinates of its scan (LPS), wherever the patient lies, in the room
 /// or by a registration.

@@ -15,7 +15,7 @@ use super::digest::voxels_sha256;
 use super::files::{LABELS_FILE, NAMES_FILE, REPORT_FILE, VOLUME_FILE};
 use super::overview::OverviewRow;
 use super::patient::is_under;
-use crate::Stop;
+use crate::stop::Stop;
 
 /// Farthest that a corner of the volume may be from where the report has it, m: a file has single precision.
 const SAME_PLACE_M: f64 = 1e-5;

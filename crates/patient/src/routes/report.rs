@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::joint::{Asked, AxisError, ROLLS, Served};
 use super::{RouteTask, WithRobot};
-use crate::suggest::Refused;
+use crate::proposal::Refused;
 
 /// The routes to a target. Lengths in m, angles in rad unless a name says otherwise, places in frame `phantom`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -362,7 +362,7 @@ fn reasons(asked: &[Asked]) -> Vec<Refused> {
         let broken = each.configurations.iter();
         blocked.chain(broken.filter_map(|served| served.reason.as_deref()))
     });
-    crate::suggest::counted(all)
+    crate::proposal::counted(all)
 }
 
 fn unbeaten(asked: &[Asked]) -> Vec<(usize, &'static str)> {

@@ -12,11 +12,11 @@ use needlebench_routing::{Obstacle, RouteRules};
 use needlebench_scenario::scenario::GoalSection;
 use needlebench_scenario::{Goal, GoalPlacer, ResolvedScenario};
 use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
+use needlebench_uncertainty::servo_of;
 use serde::Serialize;
 
 use super::{Rounded, RouteTask};
-use crate::real_cell::servo_of;
-use crate::suggest::SuggestError;
+use crate::proposal::SuggestError;
 
 /// Directions about the needle that are looked at for each configuration.
 pub(super) const ROLLS: u32 = 12;

@@ -24,7 +24,7 @@ use super::patient::{PatientFrame, Room};
 use super::touched::Draws;
 use super::written_folder::{SetAside, WrittenPatient, write_json, write_patient};
 use super::{CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan};
-use crate::Stop;
+use crate::stop::Stop;
 
 /// A scenario whose phantom was scanned.
 #[derive(Debug)]

@@ -3,9 +3,9 @@
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use needlebench_bench::ct::{BuildOptions, GivenLabels, ScanBuild, build};
 use needlebench_imaging::LesionSeed;
 use needlebench_parallel::{Control, Silent};
+use needlebench_patient::ct::{BuildOptions, GivenLabels, ScanBuild, build};
 use needlebench_volume::read::{Description, ReadVolume};
 use needlebench_volume::write::write_label_nifti;
 use needlebench_volume::{AIR_HU, LabelMap, Volume, VoxelGrid};

@@ -10,12 +10,11 @@
 //! 3. The choice is the best of the paths with as many feasible configurations as the scenario requires. The odds
 //!    ratios are not known to a tenth: paths whose odds differ by less are equal, and are ordered by what is left of
 //!    their margins. Beside it stands what nothing beats in risk, clearance, expected error and room at once.
-//! 4. Configurations on the chosen route are ranked by a run of it ([`rank`]).
+//! 4. Configurations on the chosen route are ranked by a run of it (`needlebench_bench::rank_route`).
 //! 5. If a safer route fails by the robot alone, the smallest change that would free it is looked for.
 
 mod freeing;
 mod joint;
-mod ranked;
 mod report;
 
 use std::sync::Arc;
@@ -32,12 +31,11 @@ use needlebench_scenario::{GoalPlacer, ResolvedScenario};
 use needlebench_volume::{BesideKind, VolumeError};
 
 use crate::ct::BuiltFolder;
-use crate::suggest::SuggestError;
+use crate::proposal::SuggestError;
 use joint::{Asked, Served, ask, ask_until};
 
 pub use freeing::free;
 pub use joint::AxisError;
-pub use ranked::rank;
 pub use report::{
     ChosenRoute, ConfigurationAnswer, Freed, Freeing, MapColumns, MarginReport, RouteAnswer,
     RoutePlan, RuleCount, WhyNot,
@@ -171,7 +169,11 @@ impl RouteTask<'_> {
     }
 
     /// The patient.
-    pub(crate) fn phantom(&self) -> Result<&Arc<Phantom>, SuggestError> {
+    /// The patient.
+    ///
+    /// # Errors
+    /// A scenario without one.
+    pub fn phantom(&self) -> Result<&Arc<Phantom>, SuggestError> {
         let placed = self.resolved.phantom.as_ref();
         let placed =
             placed.ok_or_else(|| SuggestError::refused("no patient", "add a [phantom] section"))?;

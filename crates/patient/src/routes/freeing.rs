@@ -13,7 +13,7 @@ use needlebench_scenario::{Change, KeyPath, Overrides, ResolvedScenario, Scenari
 use super::RouteTask;
 use super::joint::ROLLS;
 use super::report::{Freed, Freeing, RoutePlan};
-use crate::suggest::SuggestError;
+use crate::proposal::SuggestError;
 
 /// Step of a base or a table that is moved, mm.
 const STEP_MM: f64 = 25.0;
