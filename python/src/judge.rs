@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use needlebench_bench::ct::{LastScan, scanned};
 use needlebench_bench::judge::answers::{AnswersOptions, TOLERANCE, judge_answers as judge_all};
 use needlebench_bench::judge::free::judge_free as judge_alone;
 use needlebench_bench::judge::{JudgeError, JudgeOptions, judge as judge_motion};
-use needlebench_bench::{Control, RunOptions, Runnable, ScenarioRun};
+use needlebench_bench::{RunOptions, Runnable, ScenarioRun};
 use needlebench_input::{Finding, printable_json};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::Between;
+use needlebench_parallel::Control;
+use needlebench_patient::ct::{LastScan, scanned};
 use needlebench_recorded::{MotionFile, answers_of, motion_of_points};
 use needlebench_scenario::scenario::EngineName;
 use needlebench_scenario::{Overrides, ResolvedScenario};

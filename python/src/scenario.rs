@@ -4,14 +4,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use needlebench::KinematicArm;
-use needlebench_bench::ct::{BuildFiles, LastScan, imaged, scanned};
-use needlebench_bench::{Control, RunOptions, Runnable, ScenarioRun, Stop};
+use needlebench_bench::{RunOptions, Runnable, ScenarioRun};
 use needlebench_cell::Cell;
 use needlebench_clearance::{CertificateOptions, ClearanceModel, PairClearance, certify};
 use needlebench_engine::ENGINES;
 use needlebench_input::Finding;
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
+use needlebench_parallel::Control;
+use needlebench_patient::Stop;
+use needlebench_patient::ct::{BuildFiles, LastScan, imaged, scanned};
 use needlebench_report::files::{Folder, RunFiles, write_run};
 use needlebench_scenario::scenario::EngineName;
 use needlebench_scenario::{Overrides, ResolvedScenario, load_scenario};

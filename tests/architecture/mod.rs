@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Every crate under `crates/`, the Python package, and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 34] = [
+const LAYERS: [(&str, &[&str]); 36] = [
     ("elementary", &[]),
     ("parallel", &[]),
     ("numerics", &[]),
@@ -65,18 +65,20 @@ const LAYERS: [(&str, &[&str]); 34] = [
         "recorded",
         &["ros", "scenario", "cell", "input", "kinematics"],
     ),
+    ("volume", &["parallel"]),
     (
         "imaging",
-        &["geometry", "kinematics", "numerics", "parallel"],
+        &["volume", "geometry", "kinematics", "numerics", "parallel"],
     ),
     (
         "synthesis",
-        &["imaging", "geometry", "kinematics", "numerics"],
+        &["volume", "geometry", "kinematics", "numerics"],
     ),
     (
         "routing",
         &[
             "imaging",
+            "volume",
             "scenario",
             "phantom",
             "cell",
@@ -102,13 +104,34 @@ const LAYERS: [(&str, &[&str]); 34] = [
     ),
     ("credibility", &["show", "evaluation", "engine", "input"]),
     (
-        "bench",
+        "patient",
         &[
-            "iso9283",
             "synthesis",
             "evaluation",
             "routing",
             "imaging",
+            "volume",
+            "uncertainty",
+            "engine",
+            "planning",
+            "clearance",
+            "scenario",
+            "phantom",
+            "cell",
+            "input",
+            "geometry",
+            "kinematics",
+            "numerics",
+            "parallel",
+        ],
+    ),
+    (
+        "bench",
+        &[
+            "iso9283",
+            "evaluation",
+            "patient",
+            "routing",
             "urscript",
             "recorded",
             "study",
@@ -132,6 +155,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
         "export",
         &[
             "bench",
+            "patient",
             "evaluation",
             "ros",
             "engine",
@@ -151,8 +175,10 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "show",
             "export",
             "bench",
+            "patient",
             "evaluation",
             "imaging",
+            "volume",
             "recorded",
             "study",
             "uncertainty",
@@ -177,15 +203,17 @@ const LAYERS: [(&str, &[&str]); 34] = [
         &[
             "report",
             "bench",
+            "patient",
             "evaluation",
             "routing",
-            "imaging",
+            "volume",
             "uncertainty",
             "planning",
             "scenario",
             "cell",
             "input",
             "kinematics",
+            "parallel",
         ],
     ),
     (
@@ -201,6 +229,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "input",
             "kinematics",
             "numerics",
+            "parallel",
         ],
     ),
     (
@@ -215,10 +244,13 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "report",
             "export",
             "bench",
+            "patient",
             "evaluation",
             "imaging",
+            "volume",
             "recorded",
             "study",
+            "uncertainty",
             "engine",
             "planning",
             "clearance",
@@ -228,6 +260,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "cell",
             "input",
             "kinematics",
+            "parallel",
         ],
     ),
     (
@@ -236,6 +269,7 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "needlebench",
             "report",
             "bench",
+            "patient",
             "evaluation",
             "engine",
             "planning",
@@ -245,12 +279,13 @@ const LAYERS: [(&str, &[&str]); 34] = [
             "cell",
             "input",
             "kinematics",
+            "parallel",
         ],
     ),
 ];
 
 /// The same for tests alone: what their inputs are made of.
-const FOR_TESTS: [(&str, &[&str]); 8] = [
+const FOR_TESTS: [(&str, &[&str]); 9] = [
     ("geometry", &["numerics"]),
     ("scenario", &["numerics"]),
     ("clearance", &["input", "robot", "scenario"]),
@@ -259,6 +294,7 @@ const FOR_TESTS: [(&str, &[&str]); 8] = [
     ("recorded", &["numerics"]),
     ("routing", &["numerics"]),
     ("iso9283", &["numerics"]),
+    ("viewer", &["imaging"]),
 ];
 
 /// Dependencies that few crates have, hidden behind their own types.
@@ -288,7 +324,7 @@ const OWNERS: [(&str, &[&str]); 21] = [
     ("zstd", &["study"]),
     ("crc32fast", &["study"]),
     ("mcap", &["ros"]),
-    ("dicom-transfer-syntax-registry", &["imaging"]),
+    ("dicom-transfer-syntax-registry", &["volume"]),
     ("axum", &["viewer"]),
     ("png", &["render"]),
     ("quick-junit", &["report"]),

@@ -14,11 +14,10 @@ use needlebench_evaluation::referee::{
     measured_order, steps_before_contact, tip_difference,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
 use needlebench_planning::GoalPlan;
 use needlebench_scenario::Goal;
 
-use crate::control::Control;
 use crate::setup::Setup;
 use crate::simulate::EngineRun;
 

@@ -13,9 +13,9 @@ use needlebench_parallel::in_parallel;
 use needlebench_planning::{ConfigurationPlan, Member, Planner};
 use needlebench_scenario::{Expected, Goal, GoalPlacer, ResolvedScenario};
 use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
+use needlebench_uncertainty::servo_of;
 
 use crate::preview::{GoalPreview, preview_of};
-use crate::servo_of;
 
 /// Directions about the needle of a quick answer, as of planned routes.
 const QUICK_ROLLS: u32 = 12;

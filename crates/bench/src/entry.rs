@@ -4,15 +4,17 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Point3;
+use needlebench_parallel::{Control, Silent};
+use needlebench_patient::SuggestError;
+use needlebench_patient::routes::{
+    FreeRoutes, RouteTask, SOLID_DIRECTIONS, WithRobot, free_routes,
+};
 use needlebench_phantom::Phantom;
 use needlebench_routing::RouteRules;
 use needlebench_scenario::scenario::{GoalSection, NeedleRouteSection, RouteSection};
 use needlebench_scenario::{ChooseEntry, ChosenEntry, GoalPlacer, NoEntry, ResolvedScenario};
 
-use crate::Control;
-use crate::progress::Silent;
-use crate::routes::{FreeRoutes, RouteTask, SOLID_DIRECTIONS, WithRobot, free_routes};
-use crate::suggest::{SuggestError, suggest_entries};
+use crate::suggest::suggest_entries;
 
 /// Patients whose admissible needle paths are kept: as many as six sizes of chest with four lesions, and some more.
 const MOST_KEPT: usize = 32;
@@ -150,21 +152,6 @@ fn nothing_serves(message: String, hint: &str) -> NoEntry {
         message,
         hint: hint.to_owned(),
         nothing_serves: true,
-    }
-}
-
-impl From<SuggestError> for NoEntry {
-    fn from(error: SuggestError) -> Self {
-        let message = error.to_string();
-        let hint = match error {
-            SuggestError::Interrupted => String::new(),
-            SuggestError::Refused { hint, .. } => hint,
-        };
-        Self {
-            message,
-            hint,
-            nothing_serves: false,
-        }
     }
 }
 

@@ -17,13 +17,12 @@ use needlebench_evaluation::report::{ClearanceReport, EngineFailure, Report};
 use needlebench_evaluation::{
     EngineDifference, certified_clearance, pairs, recorded_clearance, sample_indices,
 };
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
 use needlebench_planning::excitation::{ExcitationError, ExcitationPlan};
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::excitation::ExcitationProtocol;
 
 use crate::assemble::notes;
-use crate::control::Control;
 use crate::iso9283::{empty_report, unplanned};
 use crate::rtde::{RtdeLog, RtdeSource};
 use crate::scenario_run::{ExcitationRun, RealArm, RunError, ScenarioRun};

@@ -7,11 +7,11 @@ use needlebench_evaluation::report::{ConfigurationReport, Report, Status};
 use needlebench_input::Finding;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_parallel::Control;
 use needlebench_planning::ConfigurationPlan;
 use needlebench_scenario::scenario::EngineName;
 use needlebench_scenario::{Goal, ResolvedScenario};
 
-use crate::control::Control;
 use crate::run::run;
 use crate::runnable::Runnable;
 use crate::scenario_run::{RunOptions, ScenarioRun};

@@ -1,9 +1,8 @@
 //! The first stage: plans of all goals, and which motions are worth a simulation.
 
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
 use needlebench_planning::{ConfigurationPlan, GoalPlan};
 
-use crate::control::Control;
 use crate::setup::Setup;
 
 /// One motion to simulate.

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::ClearanceModel;
-use needlebench_engine::{Actuation, Servo, ServoGains};
+use needlebench_engine::Actuation;
 use needlebench_evaluation::report::TruthReport;
 use needlebench_evaluation::{ClearanceSeries, NeedleMeasurement, measure_needle};
 use needlebench_kinematics::registration::RegistrationError;
@@ -11,7 +11,7 @@ use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{Joints, rotation_vector};
 use needlebench_numerics::random::SplitMix64;
 use needlebench_scenario::{Goal, PlacedPhantom, ResolvedScenario};
-use needlebench_uncertainty::{Layout, Settled, Truth, settle_after};
+use needlebench_uncertainty::{Layout, Settled, Truth, servo_of, settle_after};
 
 /// Keeps the draw of imperfections apart from the other things that a scenario's seed decides.
 const STREAM: u64 = 0x7472_7574_6821;
@@ -200,18 +200,4 @@ pub(crate) fn drawn_truth(resolved: &ResolvedScenario) -> Option<Result<Truth, R
         &draw,
         noise_seed,
     ))
-}
-
-/// The servo as it assumes the robot, and gravity, to be.
-pub fn servo_of(resolved: &ResolvedScenario) -> Servo {
-    let settings = &resolved.servo;
-    let believed = resolved.gravity.believed();
-    Servo {
-        dynamics: resolved.cell.dynamics_under(&believed),
-        gains: ServoGains {
-            kp_nm_per_rad: settings.stiffness_nm_rad,
-            kd_nms_per_rad: settings.damping_nms_rad,
-        },
-        effort_limit_nm: resolved.cell.robot.limits.efforts_nm(),
-    }
 }

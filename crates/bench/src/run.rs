@@ -16,7 +16,7 @@ use needlebench_evaluation::trace::trace;
 use needlebench_evaluation::{
     comparing_engines, criteria_with_limits, excitation as excited, iso9283 as protocol,
 };
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, Progress, Silent, in_parallel};
 use needlebench_planning::GoalPlan;
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::study::StudyMode;
@@ -24,12 +24,10 @@ use needlebench_scenario::study::StudyMode;
 use crate::adjudication::Adjudicator;
 use crate::assemble::{Results, assemble};
 use crate::budgets::budgets;
-use crate::control::Control;
 use crate::events::{self, EventRun};
 use crate::excitation;
 use crate::iso9283;
 use crate::plan::{Job, Planned, plan_goals};
-use crate::progress::{Progress, Silent};
 use crate::rtde::RtdeSource;
 use crate::runnable::Runnable;
 use crate::scenario_run::{RealArm, RunError, RunOptions, ScenarioRun, StoppedRun};

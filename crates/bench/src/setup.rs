@@ -7,8 +7,9 @@ use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::Planner;
 use needlebench_scenario::ResolvedScenario;
+use needlebench_uncertainty::servo_of;
 
-use crate::real_cell::{RealCell, servo_of};
+use crate::real_cell::RealCell;
 
 /// Why a scenario cannot be run at all.
 #[derive(Debug, thiserror::Error)]

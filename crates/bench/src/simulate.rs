@@ -9,9 +9,9 @@ use needlebench_engine::{
 use needlebench_evaluation::report::EngineFailure;
 use needlebench_evaluation::{ClearanceSeries, measure_clearance, recorded_clearance};
 use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_parallel::Control;
 use needlebench_planning::GoalPlan;
 
-use crate::control::Control;
 use crate::plan::Job;
 use crate::setup::Setup;
 

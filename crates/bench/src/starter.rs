@@ -7,14 +7,15 @@ use std::path::Path;
 
 use needlebench_cell::part_in_words;
 use needlebench_input::Finding;
+use needlebench_parallel::Control;
+use needlebench_patient::SuggestError;
 use needlebench_scenario::{
     Overrides, ResolvedScenario, ScenarioFamily, resolve_open_scenario, resolve_scenario,
 };
 
 use crate::Runnable;
-use crate::control::Control;
 use crate::preview::Preview;
-use crate::suggest::{Entry, Place, SuggestError, suggest_entries, suggest_places};
+use crate::suggest::{Entry, Place, suggest_entries, suggest_places};
 
 /// What a first scenario begins from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

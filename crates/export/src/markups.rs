@@ -1,7 +1,7 @@
 //! The needles as markups of 3D Slicer, over the scan that the patient was built from.
 
 use nalgebra::Point3;
-use needlebench_bench::ct::{ScanNeedle, ScanNeedles};
+use needlebench_patient::ct::{ScanNeedle, ScanNeedles};
 use needlebench_scenario::ResolvedScenario;
 use serde_json::{Value, json};
 

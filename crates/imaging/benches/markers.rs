@@ -11,8 +11,8 @@ use needlebench_imaging::markers::{MarkerModel, Options, find_markers};
 use needlebench_imaging::registration::{
     MatchOptions, ReferenceFrame, ReferenceMarker, match_markers, register_weighted,
 };
-use needlebench_imaging::{Volume, VoxelGrid};
 use needlebench_numerics::random::SplitMix64;
+use needlebench_volume::{Volume, VoxelGrid};
 
 const SIZE: [usize; 3] = [512, 512, 300];
 

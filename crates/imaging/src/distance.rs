@@ -9,10 +9,8 @@
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::Point3;
+use needlebench_volume::{VolumeError, VoxelGrid, in_slices};
 
-use crate::ImagingError;
-use crate::grid::VoxelGrid;
-use crate::in_slices::in_slices;
 use crate::mask::{IndexBox, Mask};
 use crate::spacing::{orthogonal, whole};
 
@@ -67,7 +65,7 @@ impl DistanceField {
         set: &Mask,
         within: IndexBox,
         options: &DistanceOptions<'_>,
-    ) -> Result<Self, ImagingError> {
+    ) -> Result<Self, VolumeError> {
         Self::to(To::Centre, grid, set, within, options)
     }
 
@@ -78,7 +76,7 @@ impl DistanceField {
         set: &Mask,
         within: IndexBox,
         options: &DistanceOptions<'_>,
-    ) -> Result<Self, ImagingError> {
+    ) -> Result<Self, VolumeError> {
         Self::to(To::Box, grid, set, within, options)
     }
 
@@ -88,7 +86,7 @@ impl DistanceField {
         set: &Mask,
         within: IndexBox,
         options: &DistanceOptions<'_>,
-    ) -> Result<Self, ImagingError> {
+    ) -> Result<Self, VolumeError> {
         let spacing_m = orthogonal(grid)?;
         // What is outside the box counts as far as the cap reaches.
         let reach = [0, 1, 2].map(|axis| whole(options.cap_m / spacing_m[axis]) + 1);
@@ -120,7 +118,7 @@ impl DistanceField {
         set: &Mask,
         within: IndexBox,
         options: &DistanceOptions<'_>,
-    ) -> Result<Self, ImagingError> {
+    ) -> Result<Self, VolumeError> {
         let mut field = Self::new(grid, set, within, options)?;
         let inside = Self::new(grid, &set.complement(), within, options)?;
         for (outside, inside) in field.steps.iter_mut().zip(inside.steps) {
@@ -278,7 +276,7 @@ fn distances(
     to: To,
     spacing_m: [f64; 3],
     options: &DistanceOptions<'_>,
-) -> Result<Vec<i16>, ImagingError> {
+) -> Result<Vec<i16>, VolumeError> {
     let [nx, ny, _] = mask.size();
     let far = whole(options.cap_m / spacing_m[2]).min(i16::MAX as usize - 2) + 2;
     let far = i16::try_from(far).unwrap_or(i16::MAX);
@@ -685,6 +683,6 @@ mod tests {
             IndexBox::whole([4; 3]),
             &options,
         );
-        assert_eq!(field.err(), Some(ImagingError::Interrupted));
+        assert_eq!(field.err(), Some(VolumeError::Interrupted));
     }
 }

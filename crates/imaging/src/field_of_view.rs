@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_geometry::TriangleMesh;
+use needlebench_volume::{AIR_HU, Volume, VoxelGrid};
 
-use crate::grid::VoxelGrid;
 use crate::mask::Mask;
 use crate::spacing::whole;
-use crate::volume::{AIR_HU, Volume};
 
 /// Slices that are looked at for padding.
 const SLICES: usize = 32;
@@ -85,8 +84,9 @@ pub struct FieldOfView {
 }
 
 impl FieldOfView {
-    /// Of a volume with a value for each voxel, whose slices run along the patient ([`crate::in_order`]): all voxels, or
-    /// those within the convex outline outside which all slices have padding.
+    /// Of a volume with a value for each voxel, whose slices run along the patient
+    /// ([`needlebench_volume::in_order`]): all voxels, or those within the convex outline outside which all slices have
+    /// padding.
     pub fn of(volume: &Volume) -> Self {
         let grid = &volume.grid;
         let [nx, ny, _] = grid.size();

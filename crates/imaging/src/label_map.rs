@@ -4,19 +4,18 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nalgebra::Point3;
+use needlebench_volume::{
+    LabelMap, Remark, Structure, SurfaceTissue, Volume, VolumeError, VoxelGrid, structure_of,
+};
 
 use crate::components::{Components, Connectivity};
-use crate::error::{ImagingError, Remark};
 use crate::field_of_view::FieldOfView;
-use crate::grid::VoxelGrid;
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::dilated;
 use crate::segment::{
     FIRST_LESION, Label, LabelFacts, Lesion, Segmentation, Side, label_facts, label_map, paint,
 };
 use crate::spacing::orthogonal;
-use crate::structures::{Structure, SurfaceTissue, structure_of};
-use crate::volume::{LabelMap, Volume};
 
 /// A structure of a label map from elsewhere.
 pub(crate) struct Given {
@@ -32,7 +31,7 @@ pub(crate) fn seen_labels<'a>(
     grid: &VoxelGrid,
     seen: &FieldOfView,
     remarks: &mut Vec<Remark>,
-) -> Result<Cow<'a, LabelMap>, ImagingError> {
+) -> Result<Cow<'a, LabelMap>, VolumeError> {
     check_same_grid(&map.grid, grid)?;
     let Some(unseen) = seen.unseen(grid) else {
         return Ok(Cow::Borrowed(map));
@@ -68,10 +67,10 @@ pub(crate) fn given_structures(
     map: &LabelMap,
     grid: &VoxelGrid,
     remarks: &mut Vec<Remark>,
-) -> Result<Vec<Given>, ImagingError> {
+) -> Result<Vec<Given>, VolumeError> {
     check_same_grid(&map.grid, grid)?;
     if map.names.len() > MOST_LABELS {
-        return Err(ImagingError::refused(format!(
+        return Err(VolumeError::refused(format!(
             "it has {} labels, at most {MOST_LABELS} are read",
             map.names.len()
         ))
@@ -128,12 +127,12 @@ const MOST_LABELS: usize = 60_000;
 /// A hundredth of a voxel at the corners: what rounding of headers to single precision leaves.
 const SAME_PLACE: f64 = 0.01;
 
-fn check_same_grid(map: &VoxelGrid, volume: &VoxelGrid) -> Result<(), ImagingError> {
+fn check_same_grid(map: &VoxelGrid, volume: &VoxelGrid) -> Result<(), VolumeError> {
     let hint =
         "resample the label map to the volume (3D Slicer: Resample Image, with nearest neighbour)";
     if map.size() != volume.size() {
         let words = |[i, j, k]: [usize; 3]| format!("{i} x {j} x {k}");
-        return Err(ImagingError::refused(format!(
+        return Err(VolumeError::refused(format!(
             "it has {} voxels, the volume {}",
             words(map.size()),
             words(volume.size())
@@ -152,7 +151,7 @@ fn check_same_grid(map: &VoxelGrid, volume: &VoxelGrid) -> Result<(), ImagingErr
         }));
         let apart_m = (map.ct_from_index(&index) - volume.ct_from_index(&index)).norm();
         if apart_m > SAME_PLACE * spacing_m {
-            return Err(ImagingError::refused(format!(
+            return Err(VolumeError::refused(format!(
                 "its corners are up to {:.2} mm from the volume's",
                 1e3 * apart_m
             ))
@@ -223,7 +222,7 @@ pub(crate) fn complete(
     given: &[Given],
     grid: &VoxelGrid,
     remarks: &mut Vec<Remark>,
-) -> Result<Option<Mask>, ImagingError> {
+) -> Result<Option<Mask>, VolumeError> {
     let body = found.body.bounds;
     let size = found.body.mask.size();
     let union_of = |wanted: &dyn Fn(&Structure) -> bool| {

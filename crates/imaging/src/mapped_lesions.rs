@@ -3,13 +3,12 @@
 use std::cmp::Reverse;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use needlebench_volume::{Remark, SurfaceTissue, Volume, VolumeError};
+
 use crate::components::{Components, Connectivity};
-use crate::error::{ImagingError, Remark};
 use crate::label_map::Given;
 use crate::mask::IndexBox;
 use crate::segment::{Lesion, LesionSeed, Segmentation};
-use crate::structures::SurfaceTissue;
-use crate::volume::Volume;
 
 /// Fewer voxels are a slip of who drew them.
 const LEAST_VOXELS: usize = 8;
@@ -46,7 +45,7 @@ pub(crate) fn mapped_lesions(
     seeds: &mut Vec<LesionSeed>,
     cancel: &AtomicBool,
     remarks: &mut Vec<Remark>,
-) -> Result<Vec<Lesion>, ImagingError> {
+) -> Result<Vec<Lesion>, VolumeError> {
     let is_lesion = |each: &mut Given| each.structure.tissue == SurfaceTissue::Lesion;
     let mut labels = Vec::new();
     for given in given.extract_if(.., is_lesion) {
@@ -141,9 +140,9 @@ pub(crate) fn mapped_lesions(
     Ok(lesions)
 }
 
-fn go_on(cancel: &AtomicBool) -> Result<(), ImagingError> {
+fn go_on(cancel: &AtomicBool) -> Result<(), VolumeError> {
     if cancel.load(Ordering::Relaxed) {
-        return Err(ImagingError::Interrupted);
+        return Err(VolumeError::Interrupted);
     }
     Ok(())
 }

@@ -100,7 +100,7 @@ impl Mask {
         }
     }
 
-    /// Voxels whose value is wanted; values in the order of [`crate::VoxelGrid::offset`].
+    /// Voxels whose value is wanted; values in the order of [`needlebench_volume::VoxelGrid::offset`].
     pub fn of<T: Copy>(size: [usize; 3], values: &[T], wanted: impl Fn(T) -> bool) -> Self {
         Self::of_box(size, values, &IndexBox::whole(size), wanted)
     }

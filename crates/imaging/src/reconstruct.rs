@@ -9,28 +9,26 @@ use needlebench_geometry::mesh::{
     MeshDefect, SurfaceIndex, check_closed, volume_m3, without_inverted_parts,
 };
 use needlebench_parallel::in_parallel;
+use needlebench_volume::{
+    BesideKind, LabelMap, Lying, Remark, SurfaceTissue, Volume, VolumeError, VoxelGrid,
+};
 use serde::Serialize;
 
-use crate::error::{ImagingError, Remark};
 use crate::field_of_view::FieldOfView;
-use crate::grid::VoxelGrid;
 use crate::label_map::{
     Given, complete, completed_labels, fill_outside, given_structures, is_solid, seen_labels,
 };
 use crate::mapped_lesions::mapped_lesions;
 use crate::mask::{IndexBox, Mask};
-use crate::patient_position::Lying;
 use crate::segment::{
-    BesideKind, Label, LabelFacts, Lesion, LesionSeed, Levels, SOFT_FROM_HU, Segmentation,
+    Label, LabelFacts, Lesion, LesionSeed, Levels, SOFT_FROM_HU, Segmentation,
     centre_covariance_m2, check_complete, grow_lesion, label_map, segment,
 };
 use crate::spacing::{orthogonal, whole};
-use crate::structures::SurfaceTissue;
 use crate::surface::{
     Field, Level, SurfaceError, Values, at_middles, local_level, refine, simplify, sound,
     surface_error, surface_net,
 };
-use crate::volume::{LabelMap, Volume};
 
 /// What is to be made of a volume.
 #[derive(Debug, Clone, Default)]
@@ -154,7 +152,7 @@ pub struct NotGrown {
     /// What it is called.
     pub name: String,
     /// Why.
-    pub error: ImagingError,
+    pub error: VolumeError,
 }
 
 /// What was made of a volume.
@@ -203,7 +201,7 @@ pub fn reconstruct(
     threads: usize,
     cancel: &AtomicBool,
     progress: Progress<'_>,
-) -> Result<Reconstruction, ImagingError> {
+) -> Result<Reconstruction, VolumeError> {
     orthogonal(&volume.grid)?;
     check_complete(volume)?;
     progress("tissues", 0.0);
@@ -232,7 +230,7 @@ pub fn reconstruct(
     for seed in &seeds {
         match grow_lesion(volume, &found, seed, cancel, &mut remarks) {
             Ok(lesion) => lesions.push(lesion),
-            Err(ImagingError::Interrupted) => return Err(ImagingError::Interrupted),
+            Err(VolumeError::Interrupted) => return Err(VolumeError::Interrupted),
             Err(error) => {
                 remarks.extend(error.remark());
                 let name = seed.name.clone();
@@ -523,7 +521,7 @@ fn make_all(
     threads: usize,
     cancel: &AtomicBool,
     progress: Progress<'_>,
-) -> Result<Vec<Option<Made>>, ImagingError> {
+) -> Result<Vec<Option<Made>>, VolumeError> {
     let begun = AtomicUsize::new(0);
     let made = in_parallel(threads, jobs, |job| {
         begun.fetch_add(1, Ordering::Relaxed);
@@ -535,9 +533,9 @@ fn make_all(
     made.into_iter().collect()
 }
 
-fn make(scan: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Made>, ImagingError> {
+fn make(scan: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Made>, VolumeError> {
     if cancel.load(Ordering::Relaxed) {
-        return Err(ImagingError::Interrupted);
+        return Err(VolumeError::Interrupted);
     }
     let volume = job.fine.unwrap_or(scan);
     let grid = &volume.grid;
@@ -588,7 +586,7 @@ fn make(scan: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Made
     }
     let mut coarse = sound(simplify(&fine, job.target, MEAN_ERROR_M));
     if cancel.load(Ordering::Relaxed) {
-        return Err(ImagingError::Interrupted);
+        return Err(VolumeError::Interrupted);
     }
     let mut checked = check_closed(&coarse);
     if matches!(checked, Err(MeshDefect::Inverted { .. })) {
@@ -596,7 +594,7 @@ fn make(scan: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Made
         checked = check_closed(&coarse);
     }
     let facts = checked.map_err(|defect| {
-        ImagingError::refused(format!("its surface does not enclose a solid: {defect}"))
+        VolumeError::refused(format!("its surface does not enclose a solid: {defect}"))
             .at(job.name.clone())
     })?;
     let index = SurfaceIndex::new(coarse);

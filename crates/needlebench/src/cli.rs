@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use needlebench_bench::progress::Progress;
 use needlebench_bench::provenance::PROGRAM_VERSION;
+use needlebench_parallel::Progress;
 
 use crate::clock;
 use crate::command::{
@@ -287,7 +287,7 @@ fn carried_out(command: Command) -> Result<ExitStatus, Failure> {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_bench::progress::Silent;
+    use needlebench_parallel::Silent;
 
     use super::*;
 

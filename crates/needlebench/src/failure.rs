@@ -1,7 +1,7 @@
 //! Failures of commands.
 
-use needlebench_bench::Stop;
 use needlebench_input::{Finding, nothing_serves};
+use needlebench_patient::Stop;
 use needlebench_study::StudyError;
 use serde::Serialize;
 

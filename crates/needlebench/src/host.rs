@@ -6,8 +6,8 @@ use std::fmt;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use needlebench_bench::progress::Progress;
 use needlebench_input::Finding;
+use needlebench_parallel::Progress;
 
 use crate::exit::ExitStatus;
 

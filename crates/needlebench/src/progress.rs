@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use needlebench_bench::progress::Progress;
+use needlebench_parallel::Progress;
 
 use crate::host;
 use crate::log;

@@ -25,10 +25,10 @@ mod timing;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use needlebench_bench::progress::Progress;
 use needlebench_bench::provenance::provenance;
 use needlebench_evaluation::report::Verdict;
 use needlebench_input::Finding;
+use needlebench_parallel::Progress;
 use needlebench_render::{Image, tile};
 use needlebench_report::files::{FilesError, Folder};
 use needlebench_report::page::parts::{Part, parts_page};

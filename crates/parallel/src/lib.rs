@@ -5,8 +5,14 @@
 //! are never more threads than were asked for, and none begins another item while one that it has begun waits.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
+mod control;
+mod progress;
+
 use rayon::prelude::*;
 use rayon::{ThreadBuilder, ThreadPoolBuilder};
+
+pub use control::Control;
+pub use progress::{Progress, Silent};
 
 /// Applies `f` to all items on up to `threads` threads; results are in the items' order. In this order they are begun
 /// too: put those that take longest first.

@@ -9,9 +9,10 @@ use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Point3, Vector3};
-use needlebench_imaging::{DistanceField, DistanceOptions, IndexBox, LabelMap, Mask, VoxelGrid};
+use needlebench_imaging::{DistanceField, DistanceOptions, IndexBox, Mask};
 use needlebench_routing::{RouteRules, VoxelAnatomy, VoxelOptions, evenly, search};
 use needlebench_scenario::scenario::OddsSection;
+use needlebench_volume::{LabelMap, VoxelGrid};
 
 const SIZE: [usize; 3] = [512, 512, 300];
 const SPACING_M: [f64; 3] = [0.7e-3, 0.7e-3, 1e-3];

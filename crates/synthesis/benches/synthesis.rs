@@ -9,10 +9,10 @@ use std::time::Duration;
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use needlebench_geometry::{Shape, Solid};
-use needlebench_imaging::write::write_nifti;
-use needlebench_imaging::{Volume, VoxelGrid};
 use needlebench_kinematics::Pose;
 use needlebench_synthesis::{Kernel, Scanner, Scene, label, synthesise};
+use needlebench_volume::write::write_nifti;
+use needlebench_volume::{Volume, VoxelGrid};
 
 /// A trunk with lungs, heart, ribs of a shell and an inside, vessels, a spine, lesions and markers.
 fn chest() -> Scene {

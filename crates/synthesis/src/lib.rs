@@ -32,8 +32,8 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::Vector3;
 
 use blur::{Blur, InPlane, blur_pixels, centred_gaussian};
-use needlebench_imaging::{
-    AIR_HU, ImageCircle, ImagingError, LabelMap, Volume, VoxelGrid, in_slices, room_for,
+use needlebench_volume::{
+    AIR_HU, ImageCircle, LabelMap, Volume, VolumeError, VoxelGrid, in_slices, room_for,
 };
 use noise::{NoiseBuffers, NoiseSource};
 use raster::{Cell, Contents, Raster, Stack};
@@ -53,7 +53,7 @@ pub fn synthesise(
     seed: u64,
     threads: usize,
     cancel: &AtomicBool,
-) -> Result<Volume, ImagingError> {
+) -> Result<Volume, VolumeError> {
     synthesise_watched(scene, scanner, grid, seed, threads, cancel, &|| {})
 }
 
@@ -66,7 +66,7 @@ pub fn synthesise_watched(
     threads: usize,
     cancel: &AtomicBool,
     on_slice: &(dyn Fn() + Sync),
-) -> Result<Volume, ImagingError> {
+) -> Result<Volume, VolumeError> {
     scanner.check()?;
     let frame = SliceFrame::new(grid)?;
     let raster = frame.raster(scene);
@@ -96,7 +96,7 @@ pub fn label(
     grid: &VoxelGrid,
     threads: usize,
     cancel: &AtomicBool,
-) -> Result<LabelMap, ImagingError> {
+) -> Result<LabelMap, VolumeError> {
     let frame = SliceFrame::new(grid)?;
     let raster = frame.raster(scene);
     let mut labels = room_for(grid)?;
@@ -136,7 +136,7 @@ struct SliceFrame<'g> {
 }
 
 impl<'g> SliceFrame<'g> {
-    fn new(grid: &'g VoxelGrid) -> Result<Self, ImagingError> {
+    fn new(grid: &'g VoxelGrid) -> Result<Self, VolumeError> {
         /// Cosine of the angle between columns and rows that counts as rounding of a file's decimals.
         const SQUARE: f64 = 1e-5;
         let [columns, rows, _] = grid.size();
@@ -148,7 +148,7 @@ impl<'g> SliceFrame<'g> {
         if cosine.abs() > SQUARE {
             let sine = along_columns.cross(&along_rows).norm();
             let between = libm::atan2(sine, cosine).to_degrees();
-            return Err(ImagingError::refused(format!(
+            return Err(VolumeError::refused(format!(
                 "columns and rows of the slices are {between:.3} degrees apart, not 90"
             )));
         }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use needlebench_imaging::ImagingError;
+use needlebench_volume::VolumeError;
 
 /// How the sensitivity of a slice falls off along its normal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -74,7 +74,7 @@ pub struct Scanner {
     pub streaks: Option<Streaks>,
     /// Least and greatest value that is stored, HU.
     pub range_hu: [i16; 2],
-    /// Whether what is outside the circle within the image is not seen. It is air in a [`needlebench_imaging::Volume`].
+    /// Whether what is outside the circle within the image is not seen. It is air in a [`needlebench_volume::Volume`].
     pub has_circle: bool,
 }
 
@@ -177,20 +177,20 @@ impl Scanner {
     }
 
     /// Refuses settings that mean nothing.
-    pub(super) fn check(&self) -> Result<(), ImagingError> {
+    pub(super) fn check(&self) -> Result<(), VolumeError> {
         let positive = |name: &str, value: f64, unit: &str| {
             if value.is_finite() && value > 0.0 {
                 return Ok(());
             }
             let message = format!("{name} is {value} {unit}, but must be above 0");
-            Err(ImagingError::refused(message))
+            Err(VolumeError::refused(message))
         };
         let at_least_0 = |name: &str, value: f64, unit: &str| {
             if value.is_finite() && value >= 0.0 {
                 return Ok(());
             }
             let message = format!("{name} is {value} {unit}, but must be 0 or more");
-            Err(ImagingError::refused(message))
+            Err(VolumeError::refused(message))
         };
         positive("slice thickness", 1e3 * self.slice_thickness_m, "mm")?;
         at_least_0("blur in the slice", 1e3 * self.psf_sigma_m, "mm")?;

@@ -30,7 +30,7 @@ impl Default for Scene {
         Self {
             parts: Vec::new(),
             names: Vec::new(),
-            around_hu: f64::from(needlebench_imaging::AIR_HU),
+            around_hu: f64::from(needlebench_volume::AIR_HU),
         }
     }
 }

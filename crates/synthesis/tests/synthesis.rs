@@ -7,12 +7,12 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use needlebench_geometry::mesh::SolidMesh;
 use needlebench_geometry::{Shape, Solid, sample_solids};
-use needlebench_imaging::{ImagingError, Volume, VoxelGrid};
 use needlebench_kinematics::Pose;
 use needlebench_numerics::normal::probability_below;
 use needlebench_synthesis::{
     Kernel, Noise, Overshoot, ScanPreset, Scanner, Scene, SliceProfile, label, synthesise,
 };
+use needlebench_volume::{Volume, VolumeError, VoxelGrid};
 
 const SEED: u64 = 7;
 /// Of values stored as integers: half of one, and rounding.
@@ -590,7 +590,7 @@ fn whoever_asks_to_stop_is_obeyed_and_settings_without_meaning_are_named() {
         1,
         &AtomicBool::new(true),
     );
-    assert_eq!(stopped, Err(ImagingError::Interrupted));
+    assert_eq!(stopped, Err(VolumeError::Interrupted));
     let refused = |scanner: &Scanner, grid: &VoxelGrid| match synthesise(
         &scene,
         scanner,
@@ -599,7 +599,7 @@ fn whoever_asks_to_stop_is_obeyed_and_settings_without_meaning_are_named() {
         1,
         &AtomicBool::new(false),
     ) {
-        Err(ImagingError::Refused { message, .. }) => message,
+        Err(VolumeError::Refused { message, .. }) => message,
         other => panic!("{other:?}"),
     };
     assert!(refused(&Scanner::ideal(0.0), &grid).contains("slice thickness is 0 mm"));

@@ -16,8 +16,10 @@ pub mod budget;
 mod distribution;
 mod fit;
 mod jitter;
+mod servo;
 mod settle;
 mod truth;
 
+pub use servo::servo_of;
 pub use settle::{RestingFriction, SettleError, Settled, resting_friction, settle, settle_after};
 pub use truth::{Draw, Layout, Source, Truth};

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{Point3, UnitVector3};
-use needlebench_bench::routes::FreeRoutes;
+use needlebench_patient::routes::FreeRoutes;
 use needlebench_routing::{Anatomy, Obstacle, RouteRules, VoxelAnatomy, judge};
 use serde::Serialize;
 

@@ -5,12 +5,13 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::Point3;
-use needlebench_bench::ct::{BuiltFolder, SCENARIO_FILE};
-use needlebench_bench::{Desk, Stop};
-use needlebench_imaging::{LabelMap, VoxelGrid};
+use needlebench_bench::Desk;
 use needlebench_input::Finding;
+use needlebench_patient::Stop;
+use needlebench_patient::ct::{BuiltFolder, SCENARIO_FILE};
 use needlebench_scenario::scenario::GoalSection;
 use needlebench_scenario::{OpenScenario, Overrides, load_open_scenario};
+use needlebench_volume::{LabelMap, VoxelGrid};
 
 use crate::around::LastTarget;
 

@@ -4,13 +4,13 @@
 
 use std::sync::{Arc, OnceLock};
 
-use needlebench_bench::Control;
-use needlebench_bench::routes::{
+use needlebench_parallel::Control;
+use needlebench_patient::SuggestError;
+use needlebench_patient::routes::{
     RoutePlan, RouteTask, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free_routes,
 };
-use needlebench_bench::suggest::SuggestError;
-use needlebench_imaging::{ImagingError, Remark};
 use needlebench_scenario::scenario::{GoalSection, RouteSection};
+use needlebench_volume::{Remark, VolumeError};
 use serde::Serialize;
 
 use crate::around::Around;
@@ -50,8 +50,8 @@ pub fn entries(
     let task = task_of(case, &section, &usual);
     let around = match around(case, &task, &section, control) {
         Ok(around) => around,
-        Err(VoxelsError::Scan(ImagingError::Interrupted)) => return Ok(None),
-        Err(VoxelsError::Scan(ImagingError::Refused { message, hint, .. })) => {
+        Err(VoxelsError::Scan(VolumeError::Interrupted)) => return Ok(None),
+        Err(VoxelsError::Scan(VolumeError::Refused { message, hint, .. })) => {
             return Err(Refusal { message, hint });
         }
         Err(VoxelsError::Target(finding)) => return Err(finding.into()),

@@ -6,12 +6,12 @@
 use nalgebra::{Point3, UnitVector3};
 use needlebench_bench::preview::GoalPreview;
 use needlebench_cell::{part_in_words, reason_in_words};
-use needlebench_imaging::{SurfaceTissue, VoxelGrid, structure_of};
 use needlebench_input::Finding;
 use needlebench_planning::{crossed_fissures, judged_tissues};
 use needlebench_routing::body_normal;
 use needlebench_scenario::Goal;
 use needlebench_scenario::scenario::{GoalSection, Target};
+use needlebench_volume::{SurfaceTissue, VoxelGrid, structure_of};
 use serde::{Deserialize, Serialize};
 
 use crate::around::Judged;

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use needlebench_bench::ct::SCENARIO_FILE;
-use needlebench_bench::{Control, Runnable};
+use needlebench_bench::Runnable;
 use needlebench_input::{Finding, read_text};
+use needlebench_parallel::Control;
+use needlebench_patient::ct::SCENARIO_FILE;
 use needlebench_report::write_atomically;
 use needlebench_scenario::scenario::GoalSection;
 use needlebench_scenario::{ResolvedScenario, ScenarioEdit, resolve_scenario};

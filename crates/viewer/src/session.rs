@@ -7,8 +7,8 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use needlebench_bench::ct::SESSION_FILE;
 use needlebench_input::{Finding, from_toml, to_toml};
+use needlebench_patient::ct::SESSION_FILE;
 use needlebench_report::write_atomically;
 use serde::{Deserialize, Serialize};
 

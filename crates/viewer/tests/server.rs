@@ -534,7 +534,7 @@ fn folders_that_do_not_belong_together_are_refused() {
     let refused = |change: &dyn Fn(&std::path::Path), word: &str| {
         let folder = support::copy_of(&made);
         change(folder.path());
-        let Err(needlebench_bench::Stop::Refused(findings)) = needlebench_viewer::Case::open(
+        let Err(needlebench_patient::Stop::Refused(findings)) = needlebench_viewer::Case::open(
             folder.path(),
             &needlebench_scenario::Overrides::default(),
             &std::sync::atomic::AtomicBool::new(false),

@@ -5,10 +5,10 @@ use needlebench_engine::{
     run_motions,
 };
 use needlebench_evaluation::report::EngineFailure;
+use needlebench_parallel::Control;
 use needlebench_planning::GoalPlan;
 
 use super::{EngineEvents, EventRun, section};
-use crate::control::Control;
 use crate::plan::Job;
 use crate::setup::Setup;
 

@@ -17,14 +17,13 @@ use needlebench_evaluation::report::{
 };
 use needlebench_evaluation::{EngineDifference, pairs, planned_clearance};
 use needlebench_iso9283::{Commanded, drift, evaluate};
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
 use needlebench_planning::iso9283::{ProtocolError, ProtocolPlan};
 use needlebench_robot::ArmInUse;
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::iso9283::Iso9283Protocol;
 
 use crate::assemble::{assumed, notes};
-use crate::control::Control;
 use crate::provenance::provenance;
 use crate::scenario_run::{ProtocolRun, RealArm, RunError, ScenarioRun};
 use crate::setup::Setup;

@@ -11,10 +11,10 @@ use needlebench_engine::{
 use needlebench_evaluation::iso9283::{Effort, measure_cycle};
 use needlebench_iso9283::{Arrival, Attained};
 use needlebench_numerics::random::{NormalPairs, SplitMix64};
+use needlebench_parallel::Control;
 use needlebench_planning::iso9283::{Cycle, ProtocolPlan};
 use needlebench_scenario::iso9283::Iso9283Protocol;
 
-use crate::control::Control;
 use crate::setup::Setup;
 
 /// Cycles whose arrivals are kept: those over which the standard takes the stabilisation time.

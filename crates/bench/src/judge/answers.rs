@@ -11,7 +11,7 @@ use needlebench_evaluation::report::{ConfigurationReport, Verdict};
 use needlebench_input::{Finding, nearest_name};
 use needlebench_kinematics::ik::{Certificate, Configuration, Rows, Solution, SolutionKind};
 use needlebench_kinematics::{JOINT_NAMES, Joints, Pose, rotation_angle_between, rotation_vector};
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
 use needlebench_planning::Planner;
 use needlebench_recorded::{Answer, AnswersFile, AnswersSource, Asked, Question};
 
@@ -19,7 +19,6 @@ use needlebench_scenario::{Goal, ResolvedScenario, Roll};
 use serde::Serialize;
 
 use super::JudgeError;
-use crate::control::Control;
 use crate::scenario_run::RunError;
 use crate::setup::SetupError;
 

@@ -20,13 +20,12 @@ use needlebench_evaluation::report::{
 use needlebench_input::Finding;
 use needlebench_kinematics::ik::{Configuration, Kinematics};
 use needlebench_kinematics::trajectory::{Between, JointTrajectory, Phase};
+use needlebench_parallel::{Control, Progress};
 use needlebench_planning::{ClassMargin, ConfigurationPlan, GivenMotion, GoalPlan, Held, Planner};
 use needlebench_recorded::MotionFile;
 use needlebench_scenario::{Goal, ResolvedScenario};
 
-use crate::control::Control;
 use crate::plan::Planned;
-use crate::progress::Progress;
 use crate::run::{judge_rest, leave_open, run_goals};
 use crate::scenario_run::{RunError, RunOptions, ScenarioRun};
 use crate::setup::SetupError;

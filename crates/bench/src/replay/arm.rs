@@ -7,8 +7,7 @@ use needlebench_engine::{Actuation, JointFriction, Servo, ServoGains};
 use needlebench_kinematics::{Body, JOINT_COUNT, JOINT_LABELS, Joints};
 use needlebench_recorded::{Identification, Load, RecordedRun};
 use needlebench_scenario::ResolvedScenario;
-
-use crate::servo_of;
+use needlebench_uncertainty::servo_of;
 
 /// A rotor of less than this share of the known one is none.
 const LEAST_ROTOR: f64 = 0.05;

@@ -18,6 +18,7 @@ use needlebench_engine::{Engine, EngineIdentity, EnginePool};
 use needlebench_evaluation::report::{CriterionResult, EngineFailure, NotJudged, Verdict};
 use needlebench_input::Finding;
 use needlebench_kinematics::{Joints, UrGeometry};
+use needlebench_parallel::Control;
 use needlebench_recorded::{
     ArmFit, CalibrationFit, Estimate, Identification, KnownArm, LogKind, LogSource, RecordedRun,
     Tracking, arm_fits, calibrate, identify, tracking,
@@ -26,7 +27,6 @@ use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::scenario::ReplaySection;
 use serde::Serialize;
 
-use crate::control::Control;
 use crate::provenance::provenance;
 use arm::ReplayedArm;
 pub use compare::{Course, EngineReplay};

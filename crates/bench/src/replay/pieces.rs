@@ -10,11 +10,11 @@ use needlebench_engine::{
 };
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{Between, JointTrajectory, Phase};
+use needlebench_parallel::Control;
 use needlebench_recorded::RecordedRun;
 
 use super::arm::ReplayedArm;
 use super::compare::Course;
-use crate::control::Control;
 
 /// Longest piece, s.
 const LONGEST_S: f64 = 20.0;

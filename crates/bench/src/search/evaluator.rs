@@ -1,11 +1,11 @@
 //! The rows of a generation's cases.
 
+use needlebench_patient::ct::{LastScan, scanned};
 use needlebench_scenario::study::StudyMode;
 use needlebench_study::search::GenerationDesign;
 use needlebench_study::{CaseDesign as _, CaseError, CaseEvaluator, CaseResult, CaseWorker};
 
 use super::PreparedSearch;
-use crate::ct::{LastScan, scanned};
 use crate::study::{StaticWorker, StudyCase, counted_classes, rows_without_scenario};
 
 /// Computes the cases of a generation: final postures.

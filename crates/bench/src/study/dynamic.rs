@@ -8,15 +8,14 @@ use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineError, EnginePool, engine_names};
 use needlebench_evaluation::judge;
 use needlebench_evaluation::report::{Judged, Status};
+use needlebench_parallel::{Control, Silent};
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::study::StudyMode;
 use needlebench_study::Outcome;
 
 use crate::adjudication::Adjudicated;
-use crate::control::Control;
 use crate::events::{self, EventRun};
 use crate::plan::{Planned, plan_goals};
-use crate::progress::Silent;
 use crate::setup::Setup;
 use crate::simulate::{Detail, EngineRun, Simulation};
 

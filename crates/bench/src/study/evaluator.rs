@@ -1,6 +1,7 @@
 //! The rows of a case, by what the study computes of it.
 
 use needlebench_engine::{ENGINES, EnginePool, choose_engines};
+use needlebench_patient::ct::{LastScan, scanned};
 use needlebench_scenario::study::{ResolvedStudy, StudyMode};
 use needlebench_study::{CaseError, CaseEvaluator, CaseResult, CaseWorker, Design};
 
@@ -11,7 +12,6 @@ use super::margin::CountedClasses;
 use super::planned::planned_rows;
 use super::rows::StudyColumns;
 use super::static_case::{StaticWorker, rows_without_scenario};
-use crate::ct::{LastScan, scanned};
 
 /// Computes the cases of a study.
 pub struct StudyEvaluator<'a> {

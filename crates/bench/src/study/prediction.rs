@@ -8,10 +8,10 @@ use needlebench_planning::{Candidate, Planner};
 use needlebench_scenario::imperfections::Imperfections;
 use needlebench_scenario::{PlacedPhantom, ResolvedScenario};
 use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, analytic_total};
-use needlebench_uncertainty::{Truth, settle_after};
+use needlebench_uncertainty::{Truth, servo_of, settle_after};
 
 use crate::budgets::analytic_budget;
-use crate::real_cell::{drawn_truth, servo_of};
+use crate::real_cell::drawn_truth;
 
 /// What is known of the needle in one posture.
 pub(super) struct Predicted {

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use needlebench_input::nothing_serves;
 use needlebench_numerics::random::SplitMix64;
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Progress, in_parallel};
+use needlebench_patient::ct::{LastScan, scanned};
 use needlebench_scenario::study::StudyMode;
 use needlebench_study::statistics::{ChoiceRanking, Gap, ReplannedCase, gaps};
 use needlebench_study::{Outcome, Results, ResultsError};
@@ -16,8 +17,6 @@ use super::failure::CaseFailure;
 use super::planned::planned_rows;
 use super::prepare::PreparedStudy;
 use super::static_case::rows_without_scenario;
-use crate::ct::{LastScan, scanned};
-use crate::progress::Progress;
 
 /// Separates the sampling of cases from that of the samples, which have the same seed.
 const STREAM: u64 = 0x7265_706c_616e;

@@ -4,12 +4,11 @@ use std::sync::atomic::AtomicBool;
 
 use needlebench_input::Finding;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Progress, in_parallel};
 use needlebench_scenario::study::{ResolvedStudy, RobustnessSection};
 use serde::Serialize;
 
 use super::robustness::{Robustness, RobustnessSettings, robustness};
-use crate::progress::Progress;
 
 /// How far the phantom of the base scenario may move before a configuration breaks.
 #[derive(Debug, Clone, PartialEq, Serialize)]

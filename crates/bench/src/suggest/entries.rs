@@ -15,7 +15,8 @@ use std::f64::consts::FRAC_PI_3;
 
 use nalgebra::Point3;
 use needlebench_clearance::ClearanceModel;
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
+use needlebench_patient::{Refused, SuggestError, counted};
 use needlebench_planning::{Planner, crossed_fissures, judged_tissues};
 use needlebench_scenario::scenario::GoalSection;
 use needlebench_scenario::{Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction};
@@ -23,8 +24,6 @@ use needlebench_study::Outcome;
 use serde::Serialize;
 
 use super::grid::{around, directions};
-use super::{Refused, SuggestError, counted};
-use crate::control::Control;
 use crate::preview::{ConfigurationPreview, goal_preview};
 use crate::study::planned_rows;
 

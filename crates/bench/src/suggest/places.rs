@@ -11,15 +11,14 @@ use std::sync::atomic::Ordering;
 use nalgebra::Vector3;
 use needlebench_cell::ClearanceClass;
 use needlebench_input::Finding;
-use needlebench_parallel::in_parallel;
+use needlebench_parallel::{Control, in_parallel};
+use needlebench_patient::{Refused, SuggestError, counted};
 use needlebench_scenario::{Change, KeyPath, ResolvedScenario, ScenarioFamily, Setting};
 use needlebench_study::Outcome;
 use serde::Serialize;
 
 use super::grid::{BasePlace, places};
-use super::{Refused, SuggestError, counted};
 use crate::Runnable;
-use crate::control::Control;
 use crate::preview::Preview;
 use crate::study::{CaseRow, StaticWorker, planned_rows};
 

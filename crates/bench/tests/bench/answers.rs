@@ -4,16 +4,15 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use needlebench_bench::Control;
 use needlebench_bench::judge::answers::{
     AnswersOptions, AnswersReport, Defect, TOLERANCE, judge_answers,
 };
 use needlebench_bench::judge::free::judge_free;
-use needlebench_bench::progress::Silent;
 use needlebench_cell::Robot;
 use needlebench_evaluation::report::Verdict;
 use needlebench_kinematics::ik::{DampedOptions, Numerical, wrap_angle};
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_parallel::{Control, Silent};
 use needlebench_recorded::{
     Answer, AnswersFile, AnswersSource, Asked, MotionOptions, Question, read_motion,
 };

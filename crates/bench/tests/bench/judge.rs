@@ -4,13 +4,13 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use needlebench_bench::judge::{JudgeError, JudgeOptions, JudgedRun, judge};
-use needlebench_bench::progress::Silent;
 use needlebench_bench::{RunOptions, run_scenario};
 use needlebench_cell::ClearanceClass;
 use needlebench_clearance::ClearanceModel;
 use needlebench_evaluation::report::{Status, Verdict};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointState, JointTrajectory};
+use needlebench_parallel::Silent;
 use needlebench_planning::ConfigurationPlan;
 use needlebench_recorded::{Known, MotionFile, MotionSource};
 use needlebench_scenario::scenario::EngineName;

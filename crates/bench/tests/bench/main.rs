@@ -7,6 +7,5 @@ mod judge;
 #[path = "../../../engine/tests/engine/common/replay.rs"]
 mod replay;
 mod routes;
-mod scan_orders;
 mod study_cases;
 mod suggest;

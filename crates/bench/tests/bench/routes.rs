@@ -6,12 +6,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use needlebench_bench::preview::GoalPreview;
-use needlebench_bench::progress::Silent;
-use needlebench_bench::routes::{
+use needlebench_bench::study::{NO_ENTRY, rows_without_scenario};
+use needlebench_bench::{EntryFinder, Preview};
+use needlebench_parallel::{Control, Silent};
+use needlebench_patient::routes::{
     RouteAnswer, RoutePlan, RouteTask, WithRobot, free_routes, plan_routes,
 };
-use needlebench_bench::study::{NO_ENTRY, rows_without_scenario};
-use needlebench_bench::{Control, EntryFinder, Preview};
 use needlebench_scenario::scenario::RouteSection;
 use needlebench_scenario::study::StudyMode;
 use needlebench_scenario::{

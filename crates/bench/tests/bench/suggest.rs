@@ -4,9 +4,9 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_bench::progress::Silent;
+use needlebench_bench::Preview;
 use needlebench_bench::suggest::suggest_entries;
-use needlebench_bench::{Control, Preview};
+use needlebench_parallel::{Control, Silent};
 use needlebench_planning::judge_route;
 use needlebench_scenario::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily};
 

@@ -3,11 +3,10 @@
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::Point3;
+use needlebench_volume::{Volume, VolumeError, in_slices};
 
 use super::bits::{Bits, Groups, Run, disc};
 use super::{DENSE_SHARE, DensePart, MarkerModel, Rejected};
-use crate::in_slices::in_slices;
-use crate::{ImagingError, Volume};
 
 /// Air is below: halfway between it and water.
 const SURFACE_HU: i16 = -500;
@@ -85,7 +84,7 @@ pub fn candidates(
     model: &MarkerModel,
     threads: usize,
     cancel: &AtomicBool,
-) -> Result<Candidates, ImagingError> {
+) -> Result<Candidates, VolumeError> {
     let slices = Scan::new(volume, model).slices(threads, cancel)?;
     Ok(judged(volume, model, &components(&slices)))
 }
@@ -113,7 +112,7 @@ impl<'a> Scan<'a> {
         &self,
         threads: usize,
         cancel: &AtomicBool,
-    ) -> Result<Vec<Vec<SeenRun>>, ImagingError> {
+    ) -> Result<Vec<Vec<SeenRun>>, VolumeError> {
         let mut slices: Vec<Vec<SeenRun>> = Vec::new();
         slices.resize_with(self.volume.grid.size()[2], Vec::new);
         let look = |(): &mut (), k: usize, runs: &mut [Vec<SeenRun>]| runs[0] = self.slice(k);

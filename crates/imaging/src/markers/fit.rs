@@ -1,12 +1,12 @@
 //! The fit of a marker's appearance to the voxels around it.
 
 use nalgebra::{Matrix3, Point3, Rotation3, SMatrix, Vector3};
+use needlebench_volume::{Remark, Volume};
 
 use super::model::{AIR, Appearance, Posed, UNKNOWNS, Unknowns, unknown};
 use super::noise::{Noise, REACH, SLICES};
 use super::sphere::BlurredSphere;
 use super::{DENSE_SHARE, DensePart, DetectedMarker, MarkerModel, Options};
-use crate::{Remark, Volume};
 
 type Information = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 

@@ -43,9 +43,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_kinematics::registration::Localised;
+use needlebench_volume::{Remark, Volume, VolumeError};
 use serde::{Deserialize, Serialize};
-
-use crate::{ImagingError, Remark, Volume};
 
 pub use noise::Noise;
 pub(crate) use noise::measure_noise;
@@ -147,7 +146,7 @@ impl MarkerModel {
         }
     }
 
-    fn check(&self) -> Result<(), ImagingError> {
+    fn check(&self) -> Result<(), VolumeError> {
         let lengths = match self.dense {
             DensePart::Sphere { diameter_m } => vec![("diameter", diameter_m, 0.5e-3, 30e-3)],
             DensePart::Ring { diameter_m, wire_m } => vec![
@@ -157,7 +156,7 @@ impl MarkerModel {
         };
         for (what, value, least, most) in lengths {
             if !(least..=most).contains(&value) {
-                return Err(ImagingError::refused(format!(
+                return Err(VolumeError::refused(format!(
                     "a marker's {what} of {:.3} mm is outside {:.1} to {:.0} mm",
                     value * 1e3,
                     least * 1e3,
@@ -166,7 +165,7 @@ impl MarkerModel {
             }
         }
         if !(-500.0..=30_000.0).contains(&self.hu) || !(0.0..=50e-3).contains(&self.height_m) {
-            return Err(ImagingError::refused(format!(
+            return Err(VolumeError::refused(format!(
                 "a marker of {} HU with its centre {:.1} mm above the skin is outside -500 to \
                  30000 HU and 0 to 50 mm",
                 self.hu,
@@ -181,7 +180,7 @@ impl MarkerModel {
                     .all(|v| v.is_finite())
         };
         if self.layers.len() > 2 || self.layers.iter().any(bad) {
-            return Err(ImagingError::refused(
+            return Err(VolumeError::refused(
                 "a marker's holder has at most two layers, each with its bottom below its top and a radius above 0",
             ));
         }
@@ -381,7 +380,7 @@ pub fn find_markers(
     options: &Options,
     threads: usize,
     cancel: &AtomicBool,
-) -> Result<Found, ImagingError> {
+) -> Result<Found, VolumeError> {
     model.check()?;
     check_options(options)?;
     let mut remarks = Vec::new();
@@ -393,7 +392,7 @@ pub fn find_markers(
     let mut fitted = Vec::new();
     for (rank, seed) in candidates.seeds.iter().enumerate() {
         if cancel.load(Ordering::Relaxed) {
-            return Err(ImagingError::Interrupted);
+            return Err(VolumeError::Interrupted);
         }
         if rank >= options.most_candidates {
             remarks.push(Remark::new(format!(
@@ -420,12 +419,12 @@ pub fn find_markers(
     })
 }
 
-fn check_options(options: &Options) -> Result<(), ImagingError> {
+fn check_options(options: &Options) -> Result<(), VolumeError> {
     if !(0.1e-3..=3e-3).contains(&options.blur_sigma_m)
         || options.largest_misfit.is_nan()
         || options.largest_misfit <= 0.0
     {
-        return Err(ImagingError::refused(format!(
+        return Err(VolumeError::refused(format!(
             "a blur of {:.3} mm or a maximum misfit of {} is outside 0.1 to 3 mm, or not above 0",
             options.blur_sigma_m * 1e3,
             options.largest_misfit

@@ -3,9 +3,8 @@
 use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
+use needlebench_volume::Volume;
 use serde::{Deserialize, Serialize};
-
-use crate::Volume;
 
 /// Side of a patch in voxels.
 const PATCH: usize = 16;
@@ -290,7 +289,7 @@ mod tests {
     use needlebench_numerics::random::NormalPairs;
 
     use super::*;
-    use crate::VoxelGrid;
+    use needlebench_volume::VoxelGrid;
 
     #[test]
     fn filtered_noise_is_measured_with_its_correlation() {

@@ -4,10 +4,10 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_kinematics::registration::{
     FEWEST_FIDUCIALS, Localised, RegistrationError, register, register_weighted,
 };
+use needlebench_volume::{Remark, VolumeError};
 use serde::{Deserialize, Serialize};
 
 use super::{ReferenceMarker, refused};
-use crate::{ImagingError, Remark};
 
 /// How markers are matched.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,7 +94,7 @@ pub fn match_markers(
     detected: &[Localised],
     reference: &[ReferenceMarker],
     options: &MatchOptions,
-) -> Result<MarkerMatch, ImagingError> {
+) -> Result<MarkerMatch, VolumeError> {
     check(detected, reference, options)?;
     let known: Vec<Localised> = reference
         .iter()
@@ -165,16 +165,16 @@ fn check(
     detected: &[Localised],
     reference: &[ReferenceMarker],
     options: &MatchOptions,
-) -> Result<(), ImagingError> {
+) -> Result<(), VolumeError> {
     let positive = |value: f64| value > 0.0 && value.is_finite();
     if !positive(options.placement_sigma_m) || !positive(options.left_out_chi_square) {
-        return Err(ImagingError::refused(format!(
+        return Err(VolumeError::refused(format!(
             "placement sigma {} m and chi-square of an omitted marker {} must be above 0",
             options.placement_sigma_m, options.left_out_chi_square
         )));
     }
     if detected.len().max(reference.len()) > MOST_MARKERS {
-        return Err(ImagingError::refused(format!(
+        return Err(VolumeError::refused(format!(
             "{} detected and {} known markers: at most {MOST_MARKERS} of each can be matched",
             detected.len(),
             reference.len()
@@ -214,15 +214,15 @@ fn check(
         ) = named(widened)
         {
             return Err(
-                ImagingError::refused(error.to_string()).at(format!("{what} marker {}", index + 1))
+                VolumeError::refused(error.to_string()).at(format!("{what} marker {}", index + 1))
             );
         }
     }
     Ok(())
 }
 
-fn too_few(detected: usize, reference: usize) -> ImagingError {
-    ImagingError::refused(format!(
+fn too_few(detected: usize, reference: usize) -> VolumeError {
+    VolumeError::refused(format!(
         "fewer than {FEWEST_FIDUCIALS} of {detected} detected and {reference} known markers match"
     ))
     .hint(
@@ -231,8 +231,8 @@ fn too_few(detected: usize, reference: usize) -> ImagingError {
     )
 }
 
-fn mirror_error(mirror: &Candidate) -> ImagingError {
-    ImagingError::refused(format!(
+fn mirror_error(mirror: &Candidate) -> VolumeError {
+    VolumeError::refused(format!(
         "the markers match the mirrored list: {} of them fit with left and right exchanged",
         mirror.pairs.len()
     ))
@@ -248,7 +248,7 @@ fn judge(
     second: &Alternative,
     reference: &[ReferenceMarker],
     remarks: &mut Vec<Remark>,
-) -> Result<(), ImagingError> {
+) -> Result<(), VolumeError> {
     let differing: Vec<String> = second
         .pairs
         .iter()
@@ -267,7 +267,7 @@ fn judge(
         differing.join(", ")
     );
     if second.separation_sigmas < TOSS_SIGMAS {
-        return Err(ImagingError::refused(message).hint(
+        return Err(VolumeError::refused(message).hint(
             "the layout of the markers, or of those detected, is symmetric: move one marker, or \
              detect more of them",
         ));
@@ -410,7 +410,7 @@ impl<'a> Search<'a> {
     }
 
     /// The best set of pairs below a cost that has these pairs.
-    fn best(&self, forced: &[MatchedPair], limit: f64) -> Result<Option<Candidate>, ImagingError> {
+    fn best(&self, forced: &[MatchedPair], limit: f64) -> Result<Option<Candidate>, VolumeError> {
         let mut state = State {
             pairs: forced.to_vec(),
             used: forced
@@ -429,7 +429,7 @@ impl<'a> Search<'a> {
     }
 
     /// The best set of pairs in which a marker of `best` has another partner.
-    fn contradiction(&self, best: &Candidate) -> Result<Option<Candidate>, ImagingError> {
+    fn contradiction(&self, best: &Candidate) -> Result<Option<Candidate>, VolumeError> {
         let mut second: Option<Candidate> = None;
         let mut limit = best.cost + SEPARATION_OF_INTEREST * SEPARATION_OF_INTEREST;
         for reference in 0..self.known.len() {
@@ -457,10 +457,10 @@ impl<'a> Search<'a> {
         reference: usize,
         chi_square: Option<f64>,
         state: &mut State,
-    ) -> Result<(), ImagingError> {
+    ) -> Result<(), VolumeError> {
         state.steps += 1;
         if state.steps > MOST_STEPS {
-            return Err(ImagingError::refused(format!(
+            return Err(VolumeError::refused(format!(
                 "the distances between {} detected and {} known markers match in too many ways",
                 self.detected.len(),
                 self.known.len()

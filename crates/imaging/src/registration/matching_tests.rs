@@ -62,7 +62,7 @@ fn pairs_of(order: &[usize]) -> Vec<MatchedPair> {
     pairs
 }
 
-fn message(error: &ImagingError) -> String {
+fn message(error: &VolumeError) -> String {
     error.to_string()
 }
 

@@ -80,10 +80,10 @@ impl ReferenceMarker {
 fn refused(
     error: needlebench_kinematics::registration::RegistrationError,
     name: impl Fn(usize) -> String,
-) -> crate::ImagingError {
+) -> needlebench_volume::VolumeError {
     use needlebench_kinematics::registration::RegistrationError as E;
     let message = error.to_string();
-    let refused = crate::ImagingError::refused(message);
+    let refused = needlebench_volume::VolumeError::refused(message);
     match error {
         E::BadCoordinate { index, .. } | E::BadCovariance { index } => refused.at(name(index)),
         E::Collinear { .. } | E::Undetermined => {

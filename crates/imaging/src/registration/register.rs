@@ -6,10 +6,10 @@ use needlebench_kinematics::registration::{
     self as rigid, Localised, Residual, WeightedFit, displacement_covariance, leave_one_out,
 };
 use needlebench_numerics::{chi_square, normal};
+use needlebench_volume::{Remark, VolumeError};
 use serde::{Deserialize, Serialize};
 
 use super::{MarkerMatch, ReferenceMarker, refused};
-use crate::{ImagingError, Remark};
 
 /// Probability with which a set without any moved marker is said to have one.
 const FALSE_ALARM: f64 = 0.01;
@@ -130,14 +130,14 @@ pub fn register_weighted(
     detected: &[Localised],
     reference: &[ReferenceMarker],
     frame: ReferenceFrame,
-) -> Result<Registration, ImagingError> {
+) -> Result<Registration, VolumeError> {
     let mut from = Vec::with_capacity(matched.pairs.len());
     let mut to = Vec::with_capacity(matched.pairs.len());
     for pair in &matched.pairs {
         let (Some(seen), Some(known)) =
             (detected.get(pair.detected), reference.get(pair.reference))
         else {
-            return Err(ImagingError::refused(format!(
+            return Err(VolumeError::refused(format!(
                 "detected {} and known marker {} are not both in the lists of {} and {}",
                 pair.detected + 1,
                 pair.reference + 1,
@@ -190,13 +190,13 @@ fn probability_above(chi_square: f64, degrees_of_freedom: usize) -> f64 {
 }
 
 /// Points on a line to within what is known of them determine no turn about it.
-fn check_turn(fit: &WeightedFit) -> Result<(), ImagingError> {
+fn check_turn(fit: &WeightedFit) -> Result<(), VolumeError> {
     let turns = fit.covariance.fixed_view::<3, 3>(3, 3).into_owned();
     let sigma_rad = turns.symmetric_eigenvalues().max().max(0.0).sqrt();
     if sigma_rad <= LARGEST_TURN_SIGMA_RAD {
         return Ok(());
     }
-    Err(ImagingError::refused(format!(
+    Err(VolumeError::refused(format!(
         "the markers do not determine the rotation (standard deviation {:.0} deg): they are \
          collinear within their uncertainty",
         sigma_rad.to_degrees()

@@ -1,12 +1,11 @@
 //! What is in the scan and not of the patient's trunk: arms, the couch, cushions.
 
 use nalgebra::Point3;
+use needlebench_volume::{BesideKind, Lying, Remark, VolumeError};
 
 use crate::components::{Component, Components, Connectivity};
-use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::dilated;
-use crate::patient_position::Lying;
 use crate::spacing::whole;
 
 use super::body::Body;
@@ -51,34 +50,6 @@ const COUCH_WIDTH_M: f64 = 0.06;
 /// and goes through at least this share of the slices.
 const COUCH_SHARE: f64 = 0.8;
 
-/// What something beside the body is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BesideKind {
-    /// Arms that do not touch the trunk, or other limbs.
-    Arms,
-    /// What the patient lies on, through all slices.
-    Couch,
-    /// Anything else: cushions, rails, tubes, cables.
-    Objects,
-    /// Where the couch is taken to be beyond a field of view that does not show all of it.
-    AssumedCouch,
-}
-
-impl BesideKind {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Arms, Self::Couch, Self::Objects, Self::AssumedCouch];
-
-    /// Its name in label maps, and of its surface.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Arms => "arms",
-            Self::Couch => "couch",
-            Self::Objects => "objects",
-            Self::AssumedCouch => "assumed_couch",
-        }
-    }
-}
-
 /// All of a kind beside the body.
 #[derive(Debug, Clone)]
 pub struct Beside {
@@ -97,7 +68,7 @@ pub(super) fn find(
     unseen: Option<&Mask>,
     lying: Lying,
     remarks: &mut Vec<Remark>,
-) -> Result<Vec<Beside>, ImagingError> {
+) -> Result<Vec<Beside>, VolumeError> {
     let mut dense = Mask::of(scan.size(), &scan.volume.hu, |hu| hu > SHELL_HU);
     // The blur of the skin is not beside it.
     let layer_m = SKIN_VOXELS * scan.spacing_m.into_iter().fold(0.0, f64::max);

@@ -2,8 +2,9 @@
 
 use std::borrow::Cow;
 
+use needlebench_volume::VolumeError;
+
 use crate::components::{Component, Components, Connectivity};
-use crate::error::ImagingError;
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::{dilated, eroded};
 
@@ -56,7 +57,7 @@ pub(super) fn find(
     lungs: &Lungs,
     dense: &Mask,
     bounds: &IndexBox,
-) -> Result<Mask, ImagingError> {
+) -> Result<Mask, VolumeError> {
     let mut blood = between_lungs(scan, body, lungs, dense, bounds, i16::MIN)?;
     let mut dense = Cow::Borrowed(dense);
     if blood.is_empty() {
@@ -96,7 +97,7 @@ fn between_lungs(
     dense: &Mask,
     bounds: &IndexBox,
     least_hu: i16,
-) -> Result<Mask, ImagingError> {
+) -> Result<Mask, VolumeError> {
     let none = Mask::empty(dense.size());
     let Some(around) = lungs.around() else {
         return Ok(none);
@@ -150,7 +151,7 @@ fn pools(
     seed: &Mask,
     middle: i16,
     is_in_place: &dyn Fn(&Component) -> bool,
-) -> Result<Mask, ImagingError> {
+) -> Result<Mask, VolumeError> {
     let none = Mask::empty(dense.size());
     if middle > BRIGHTEST_HU {
         return Ok(none);

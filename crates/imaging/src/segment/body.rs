@@ -1,11 +1,10 @@
 //! The patient without the couch.
 
 use nalgebra::Point3;
+use needlebench_volume::{HuHistogram, Remark, VolumeError};
 
 use crate::components::{Components, Connectivity};
-use crate::error::{ImagingError, Remark};
 use crate::field_of_view::FieldOfView;
-use crate::histogram::HuHistogram;
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::{dilated, opened};
 
@@ -59,7 +58,7 @@ pub(super) fn find(
     seen: &FieldOfView,
     unseen: Option<&Mask>,
     remarks: &mut Vec<Remark>,
-) -> Result<Body, ImagingError> {
+) -> Result<Body, VolumeError> {
     let level = below(scan.levels.skin_hu);
     let tissue = Mask::of(scan.size(), &scan.volume.hu, |hu| hu > level);
     check_units(scan, &tissue)?;
@@ -91,14 +90,14 @@ pub(super) fn find(
 }
 
 /// Refuses lengths and values that are none of a patient.
-fn check_units(scan: &Scan<'_>, tissue: &Mask) -> Result<(), ImagingError> {
+fn check_units(scan: &Scan<'_>, tissue: &Mask) -> Result<(), VolumeError> {
     let voxels = scan.volume.hu.len();
     if scan.litres(voxels) < LEAST_BODY_L {
         let size_mm = scan.size().into_iter().zip(scan.spacing_m);
         let size_mm: Vec<String> = size_mm
             .map(|(count, step_m)| format!("{:.2}", 1e3 * count as f64 * step_m))
             .collect();
-        return Err(ImagingError::refused(format!(
+        return Err(VolumeError::refused(format!(
             "the whole volume is {} mm large, less than {LEAST_BODY_L} l",
             size_mm.join(" x ")
         ))
@@ -114,7 +113,7 @@ fn check_units(scan: &Scan<'_>, tissue: &Mask) -> Result<(), ImagingError> {
         |peak| format!("the most frequent value below -500 HU is {peak}"),
     );
     let least = histogram.range_hu().map_or(0, |[least, _]| least);
-    Err(ImagingError::refused(format!(
+    Err(VolumeError::refused(format!(
         "{:.0} % of the volume is denser than {SKIN_LEVEL_HU} HU and no air is around a body: {air}, the least value \
          {least}",
         1e2 * share
@@ -122,8 +121,8 @@ fn check_units(scan: &Scan<'_>, tissue: &Mask) -> Result<(), ImagingError> {
     .hint("values must be Hounsfield units, air -1000 and water 0: check slope and intercept of the file"))
 }
 
-fn nothing_there() -> ImagingError {
-    ImagingError::refused(format!(
+fn nothing_there() -> VolumeError {
+    VolumeError::refused(format!(
         "no region of {LEAST_BODY_L} l is denser than {SKIN_LEVEL_HU} HU"
     ))
     .hint("is this a CT of a patient, in Hounsfield units?")
@@ -151,7 +150,7 @@ fn without_bed(
     scan: &Scan<'_>,
     tissue: &Mask,
     remarks: &mut Vec<Remark>,
-) -> Result<Mask, ImagingError> {
+) -> Result<Mask, VolumeError> {
     let least = scan.voxels_of(LEAST_BODY_L);
     for radius_m in [BED_HALF_THICKNESS_M, 0.5 * BED_HALF_THICKNESS_M, 0.0] {
         let open = if radius_m > 0.0 {

@@ -1,7 +1,8 @@
 //! Bone, and vessels with contrast medium.
 
+use needlebench_volume::{Remark, VolumeError};
+
 use crate::components::{Components, Connectivity};
-use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::closed;
 use crate::spacing::whole;
@@ -70,7 +71,7 @@ pub(super) fn find(
     body: &Body,
     lungs: &Lungs,
     remarks: &mut Vec<Remark>,
-) -> Result<Bone, ImagingError> {
+) -> Result<Bone, VolumeError> {
     let bounds = body.bounds;
     let mut dense = scan.denser(&body.mask.cropped(&bounds), &bounds, scan.levels.bone_hu);
     scan.check()?;
@@ -234,7 +235,7 @@ fn note_unsure(
 }
 
 /// With gaps in the shell closed and the marrow inside.
-fn solid(scan: &Scan<'_>, shell: &Mask) -> Result<Mask, ImagingError> {
+fn solid(scan: &Scan<'_>, shell: &Mask) -> Result<Mask, VolumeError> {
     let Some(bounds) = shell.bounds() else {
         return Ok(shell.clone());
     };

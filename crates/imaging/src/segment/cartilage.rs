@@ -1,7 +1,8 @@
 //! Costal cartilage: denser than muscle, less dense than bone, as thick as a finger, and hanging on ribs or sternum.
 
+use needlebench_volume::VolumeError;
+
 use crate::components::{Components, Connectivity};
-use crate::error::ImagingError;
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::{dilated, eroded, opened};
 
@@ -54,7 +55,7 @@ pub(super) fn find(
     lungs: &Lungs,
     [bone, blood]: [&Mask; 2],
     bounds: &IndexBox,
-) -> Result<(Mask, f64), ImagingError> {
+) -> Result<(Mask, f64), VolumeError> {
     let mut found = Mask::empty(bone.size());
     let Some(front) = front(scan, body, lungs, bounds) else {
         return Ok((found, USUAL_LEVEL_HU));

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
+use needlebench_volume::Lying;
 
 use crate::mask::Mask;
-use crate::patient_position::Lying;
 use crate::spacing::whole;
 
 use super::Scan;

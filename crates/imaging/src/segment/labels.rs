@@ -1,12 +1,11 @@
 //! Label maps of what was found.
 
+use needlebench_volume::{BesideKind, LabelMap, Volume};
 use serde::Serialize;
 
 use crate::mask::{IndexBox, Mask};
-use crate::volume::LabelMap;
-use crate::volume::Volume;
 
-use super::{BesideKind, Lesion, Segmentation, Side};
+use super::{Lesion, Segmentation, Side};
 
 /// Numbers of the label maps that this crate makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,7 +1,8 @@
 //! Lungs, airways and the vessels in the lungs.
 
+use needlebench_volume::{Remark, VolumeError};
+
 use crate::components::{Component, Components, Connectivity};
-use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask, pack_row};
 use crate::morphology::{bridged, dilated, eroded};
 use crate::spacing::whole;
@@ -139,7 +140,7 @@ pub(super) fn find(
     scan: &Scan<'_>,
     body: &Body,
     remarks: &mut Vec<Remark>,
-) -> Result<Lungs, ImagingError> {
+) -> Result<Lungs, VolumeError> {
     let bounds = body.bounds;
     let mut airy = body.mask.cropped(&bounds);
     airy.subtract(&scan.denser(&airy, &bounds, scan.levels.lung_hu));
@@ -485,7 +486,7 @@ fn sides(
     air: &Mask,
     empty_hu: Option<i16>,
     remarks: &mut Vec<Remark>,
-) -> Result<Vec<(Side, Mask)>, ImagingError> {
+) -> Result<Vec<(Side, Mask)>, VolumeError> {
     let pieces = Components::of(air, Connectivity::Faces);
     let axis = scan.axis_along(0);
     let mut left = Mask::empty(air.size());
@@ -585,7 +586,7 @@ fn split(
     mask: &Mask,
     axis: usize,
     middle: f64,
-) -> Result<([Mask; 2], String), ImagingError> {
+) -> Result<([Mask; 2], String), VolumeError> {
     let total = mask.count();
     for radius_mm in [0.8, 1.2, 1.6, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0] {
         scan.check()?;
@@ -657,7 +658,7 @@ pub(super) fn grow_back(
     scan: &Scan<'_>,
     halves: &mut [Mask; 2],
     within: &Mask,
-) -> Result<(), ImagingError> {
+) -> Result<(), VolumeError> {
     let layer_m = 1.01 * scan.spacing_m.iter().copied().fold(0.0, f64::max);
     loop {
         let mut grew = false;

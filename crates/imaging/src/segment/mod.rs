@@ -13,15 +13,13 @@ mod upright;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::error::{ImagingError, Remark};
+use needlebench_volume::{Lying, Orientation, Remark, Volume, VolumeError};
+
 use crate::field_of_view::FieldOfView;
 use crate::mask::{IndexBox, Mask};
-use crate::orientation::Orientation;
-use crate::patient_position::Lying;
 use crate::spacing::{orthogonal, whole};
-use crate::volume::Volume;
 
-pub use beside::{Beside, BesideKind};
+pub use beside::Beside;
 pub use body::Body;
 pub(crate) use body::SKIN_LEVEL_HU;
 pub use bone::Bone;
@@ -95,7 +93,7 @@ impl Levels {
     ///
     /// # Errors
     /// If they are not in the order of lung, soft tissue and bone, or beyond what 16 bits hold.
-    fn checked(&self) -> Result<Self, ImagingError> {
+    fn checked(&self) -> Result<Self, VolumeError> {
         let Self {
             skin_hu,
             lung_hu,
@@ -105,7 +103,7 @@ impl Levels {
             .iter()
             .all(|level| (-990.0..3000.0).contains(level));
         if !sound || skin_hu >= bone_hu || lung_hu >= bone_hu {
-            return Err(ImagingError::refused(format!(
+            return Err(VolumeError::refused(format!(
                 "levels of {skin_hu} HU (skin), {lung_hu} HU (lung) and {bone_hu} HU (bone)"
             ))
             .hint("skin and lung below bone, all between -990 and 3000 HU"));
@@ -129,7 +127,7 @@ pub fn segment(
     lying: Lying,
     levels: &Levels,
     cancel: &AtomicBool,
-) -> Result<Segmentation, ImagingError> {
+) -> Result<Segmentation, VolumeError> {
     check_complete(volume)?;
     let scan = Scan {
         volume,
@@ -154,11 +152,11 @@ pub fn segment(
 }
 
 /// Whether there is a value for each voxel, in slices along the patient.
-pub(crate) fn check_complete(volume: &Volume) -> Result<(), ImagingError> {
+pub(crate) fn check_complete(volume: &Volume) -> Result<(), VolumeError> {
     let orientation = Orientation::of(&volume.grid);
     let [_, _, (along, _)] = orientation.axes();
     if along != 2 {
-        return Err(ImagingError::refused(format!(
+        return Err(VolumeError::refused(format!(
             "its axes are {orientation}: slices do not run from feet to head"
         ))
         .hint("put the voxels in the order of the patient's axes first (`in_order`)"));
@@ -166,7 +164,7 @@ pub(crate) fn check_complete(volume: &Volume) -> Result<(), ImagingError> {
     if volume.hu.len() == volume.grid.len() {
         return Ok(());
     }
-    Err(ImagingError::refused(format!(
+    Err(VolumeError::refused(format!(
         "the grid has {} voxels, the data {}",
         volume.grid.len(),
         volume.hu.len()
@@ -272,9 +270,9 @@ impl Scan<'_> {
             .map(|at| at.cast_signed().wrapping_add(i16::MIN))
     }
 
-    fn check(&self) -> Result<(), ImagingError> {
+    fn check(&self) -> Result<(), VolumeError> {
         if self.cancel.load(Ordering::Relaxed) {
-            return Err(ImagingError::Interrupted);
+            return Err(VolumeError::Interrupted);
         }
         Ok(())
     }

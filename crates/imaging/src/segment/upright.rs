@@ -1,7 +1,8 @@
 //! Whether anatomy lies as the file says: a patient who is upside down in it has left and right wrong, too.
 
+use needlebench_volume::VolumeError;
+
 use crate::components::{Components, Connectivity};
-use crate::error::ImagingError;
 use crate::mask::IndexBox;
 
 use super::Scan;
@@ -38,7 +39,7 @@ pub(super) fn check(
     body: &Body,
     lungs: &Lungs,
     bone: &Bone,
-) -> Result<(), ImagingError> {
+) -> Result<(), VolumeError> {
     let steps = scan.volume.grid.steps_m();
     if steps[(1, 1)] == 0.0 || steps[(2, 2)] == 0.0 {
         // Axes in another order than the patient's.
@@ -56,7 +57,7 @@ pub(super) fn check(
             [high_l, low_l]
         };
         if front_l >= SPINE_L && back_l <= STERNUM * front_l {
-            return Err(ImagingError::refused(format!(
+            return Err(VolumeError::refused(format!(
                 "the spine is in front: {:.0} ml of bone at the midline in the anterior third of the body, {:.0} ml in \
                  the posterior third",
                 1e3 * front_l,
@@ -72,7 +73,7 @@ pub(super) fn check(
         [high, low]
     };
     if lower && !upper {
-        return Err(ImagingError::refused(
+        return Err(VolumeError::refused(
             "the trachea leaves the lungs at their lower end, none at their upper end",
         )
         .hint(hint));

@@ -2,9 +2,8 @@
 
 use nalgebra::Point3;
 use needlebench_geometry::mesh::SurfaceIndex;
+use needlebench_volume::VoxelGrid;
 use serde::Serialize;
-
-use crate::grid::VoxelGrid;
 
 use super::field::Field;
 

@@ -1,7 +1,8 @@
 //! The middle between a structure and what is around it, place by place.
 
+use needlebench_volume::VoxelGrid;
+
 use crate::components::{Components, Connectivity};
-use crate::grid::VoxelGrid;
 use crate::mask::{IndexBox, Mask, set_bits};
 use crate::morphology::{dilated, eroded};
 

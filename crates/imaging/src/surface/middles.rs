@@ -1,7 +1,8 @@
 //! What thick slices leave between them.
 
+use needlebench_volume::Volume;
+
 use crate::mask::IndexBox;
-use crate::volume::Volume;
 
 /// Thinner slices are as good as points.
 const THICK_M: f64 = 1.5e-3;

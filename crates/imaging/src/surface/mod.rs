@@ -8,6 +8,7 @@ mod middles;
 mod nets;
 mod simplify;
 mod sound;
+mod stl;
 
 pub use accuracy::SurfaceError;
 pub(crate) use accuracy::surface_error;
@@ -18,6 +19,7 @@ pub(crate) use middles::at_middles;
 pub(crate) use nets::surface_net;
 pub(crate) use simplify::simplify;
 pub use sound::sound;
+pub use stl::stl_bytes;
 
 #[cfg(test)]
 mod tests;

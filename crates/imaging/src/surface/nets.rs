@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 use needlebench_geometry::TriangleMesh;
+use needlebench_volume::VoxelGrid;
 
-use crate::grid::VoxelGrid;
 use crate::mask::Mask;
 
 use super::cases::{NO_SHEET, case, ends, pairs_on_face};

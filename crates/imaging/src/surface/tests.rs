@@ -4,9 +4,9 @@ use nalgebra::{Point3, Vector3};
 use needlebench_geometry::TriangleMesh;
 use needlebench_geometry::mesh::{SurfaceIndex, check_closed, volume_m3};
 use needlebench_numerics::random::SplitMix64;
+use needlebench_volume::VoxelGrid;
 
 use super::*;
-use crate::grid::VoxelGrid;
 use crate::mask::{IndexBox, Mask};
 
 /// Every edge has two triangles, of opposite directions, and the triangles around every vertex are one ring.

@@ -1,7 +1,8 @@
 //! Arms, couch and rail beside a chest.
 
 use needlebench_geometry::mesh::check_closed;
-use needlebench_imaging::{Label, Reconstruction, SurfaceTissue};
+use needlebench_imaging::{Label, Reconstruction};
+use needlebench_volume::SurfaceTissue;
 
 use super::reconstruct::{Solid, chest, grid, label_at, options, render, run};
 

@@ -1,8 +1,9 @@
 //! Blood with contrast medium, cartilage, gas and lungs that are not as usual, in a chest of analytic solids.
 
 use nalgebra::Point3;
-use needlebench_imaging::{Label, Reconstruction, Side, SurfaceTissue, Volume, VoxelGrid};
+use needlebench_imaging::{Label, Reconstruction, Side};
 use needlebench_numerics::random::SplitMix64;
+use needlebench_volume::{SurfaceTissue, Volume, VoxelGrid};
 
 use super::reconstruct::{Inside, Solid, chest, grid, label_at, options, render, run};
 

@@ -2,9 +2,7 @@
 
 mod beside;
 mod contents;
-mod names;
 mod nodules;
 mod outside;
-mod readers;
 mod reconstruct;
 mod round_view;

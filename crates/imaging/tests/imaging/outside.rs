@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Vector3};
 use needlebench_geometry::TriangleMesh;
 use needlebench_geometry::mesh::check_closed;
-use needlebench_imaging::{AIR_HU, AssumedBody, FieldOfView, Outside, Volume, VoxelGrid};
+use needlebench_imaging::{AssumedBody, FieldOfView, Outside};
+use needlebench_volume::{AIR_HU, Volume, VoxelGrid};
 
 const SPACING_MM: [f64; 3] = [3.0, 3.0, 4.0];
 const SIZE: [usize; 3] = [90, 70, 50];

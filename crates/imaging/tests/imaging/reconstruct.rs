@@ -5,9 +5,10 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_geometry::mesh::check_closed;
 use needlebench_imaging::{
-    FIRST_LESION, ImagingError, Label, LabelMap, LesionSeed, Levels, Lung, NotGrown,
-    ReconstructOptions, Reconstruction, Side, SurfaceTissue, Volume, VoxelGrid, reconstruct,
+    FIRST_LESION, Label, LesionSeed, Levels, Lung, NotGrown, ReconstructOptions, Reconstruction,
+    Side, reconstruct,
 };
+use needlebench_volume::{LabelMap, SurfaceTissue, Volume, VolumeError, VoxelGrid};
 
 pub(super) const MM: f64 = 1e-3;
 
@@ -128,7 +129,7 @@ fn seed(name: &str, at_mm: [f64; 3]) -> LesionSeed {
 pub(super) fn run(
     volume: &Volume,
     options: &ReconstructOptions,
-) -> Result<Reconstruction, ImagingError> {
+) -> Result<Reconstruction, VolumeError> {
     reconstruct(volume, options, 2, &AtomicBool::new(false), &|_, _| {})
 }
 
@@ -361,10 +362,10 @@ fn field_of_view_that_cuts_the_body_is_said_with_its_side() {
     assert!(check_closed(&made.surfaces[0].mesh).is_ok());
 }
 
-fn refusal(error: &ImagingError) -> (Option<&str>, &str) {
+fn refusal(error: &VolumeError) -> (Option<&str>, &str) {
     match error {
-        ImagingError::Interrupted => (None, "interrupted"),
-        ImagingError::Refused { place, message, .. } => (place.as_deref(), message),
+        VolumeError::Interrupted => (None, "interrupted"),
+        VolumeError::Refused { place, message, .. } => (place.as_deref(), message),
     }
 }
 
@@ -508,7 +509,7 @@ fn what_is_no_patient_is_refused() {
     let (_, message) = refusal(&error);
     assert!(message.contains("mm large"), "{message}");
     let stop = reconstruct(&patient, &options(), 1, &AtomicBool::new(true), &|_, _| {});
-    assert_eq!(stop.err(), Some(ImagingError::Interrupted));
+    assert_eq!(stop.err(), Some(VolumeError::Interrupted));
 }
 
 /// A label map of the chest, by the density of its voxels.
@@ -989,7 +990,7 @@ fn of_many_lesions_of_a_map_the_largest_are_taken() {
     assert_eq!((first.name.as_str(), first.mask.count()), ("tumor_1", 27));
     let cancelled = AtomicBool::new(true);
     let stopped = reconstruct(&volume, &options, 1, &cancelled, &|_, _| {});
-    assert_eq!(stopped.unwrap_err(), ImagingError::Interrupted);
+    assert_eq!(stopped.unwrap_err(), VolumeError::Interrupted);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Round fields of view that do not hold all of the patient, nor what the patient lies on.
 
-use needlebench_imaging::{Label, LabelMap, Lying, ReconstructOptions, Reconstruction, Volume};
+use needlebench_imaging::{Label, ReconstructOptions, Reconstruction};
+use needlebench_volume::{LabelMap, Lying, Volume};
 
 use super::beside::in_the_scanner;
 use super::reconstruct::{MM, grid, label_at, options, render, run};

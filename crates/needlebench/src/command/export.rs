@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use needlebench_bench::ct::ScanNeedles;
 use needlebench_export::{ExportError, ExportedFile, Packing, Shown, gltf, markups, mjcf, urdf};
 use needlebench_input::{Finding, nearest_name, sha256_hex};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_patient::ct::ScanNeedles;
 use needlebench_report::write_atomically;
 use needlebench_scenario::ResolvedScenario;
 use serde::Serialize;

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use needlebench_bench::suggest::SuggestError;
-use needlebench_bench::{Control, Starter, StarterOptions, Template, starter, starter_study};
+use needlebench_bench::{Starter, StarterOptions, Template, starter, starter_study};
 use needlebench_input::{Finding, nearest_name};
+use needlebench_parallel::Control;
+use needlebench_patient::SuggestError;
 use needlebench_phantom::{Phantom, SIZE_PRESETS};
 use needlebench_report::write_atomically;
 use needlebench_robot::Arm;

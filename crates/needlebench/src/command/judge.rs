@@ -4,17 +4,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use needlebench_bench::Control;
-use needlebench_bench::ct::{LastScan, scanned};
 use needlebench_bench::judge::answers::{AnswersOptions, TOLERANCE, judge_answers};
 use needlebench_bench::judge::free::judge_free;
 use needlebench_bench::judge::{
     InstalledTcp, JudgeError, JudgeOptions, is_program, judge as judge_motion, read_program,
 };
-use needlebench_bench::progress::Silent;
 use needlebench_evaluation::report::Verdict;
 use needlebench_input::Finding;
 use needlebench_kinematics::trajectory::Between;
+use needlebench_parallel::{Control, Silent};
+use needlebench_patient::ct::{LastScan, scanned};
 use needlebench_recorded::{MotionFile, MotionOptions, read_answers, read_motion};
 use needlebench_report::table::answers::answers_text;
 use needlebench_report::table::free::free_text;

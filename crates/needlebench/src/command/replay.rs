@@ -301,7 +301,7 @@ fn replayed(
         max_current_rms_a: arguments.max_current_rms.or(own.max_current_rms_a),
         max_calibration_mm: arguments.max_calibration.or(own.max_calibration_mm),
     };
-    let control = needlebench_bench::Control {
+    let control = needlebench_parallel::Control {
         threads: 1,
         cancel: &cancel,
         progress: &progress,

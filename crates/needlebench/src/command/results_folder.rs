@@ -4,8 +4,8 @@ use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::path::Path;
 
-use needlebench_imaging::write::TEMPORARY_PREFIX;
 use needlebench_input::Finding;
+use needlebench_volume::write::TEMPORARY_PREFIX;
 
 use crate::exit::ExitStatus;
 use crate::failure::Failure;

@@ -10,11 +10,13 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use needlebench_bench::accuracy::{accuracy_of_run, check_run};
-use needlebench_bench::ct::{BuildFiles, imaged};
-use needlebench_bench::{Control, RunOptions, Runnable, ScenarioRun, Stop};
+use needlebench_bench::{RunOptions, Runnable, ScenarioRun};
 use needlebench_engine::ENGINES;
 use needlebench_evaluation::report::Report;
 use needlebench_input::Finding;
+use needlebench_parallel::Control;
+use needlebench_patient::Stop;
+use needlebench_patient::ct::{BuildFiles, imaged};
 use needlebench_report::files::{Folder, RunFiles, write_run};
 use needlebench_report::{junit, markdown, report_screen, report_text, write_atomically};
 use needlebench_scenario::{Overrides, ResolvedScenario};

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use needlebench_bench::progress::Progress as _;
 use needlebench_bench::search::{GenerationEvaluator, PreparedSearch, out_of_reach, worth_of};
+use needlebench_parallel::Progress as _;
 use needlebench_report::files::{FilesError, SearchDocument, write_search, write_search_log};
 use needlebench_scenario::study::load_study;
 use needlebench_study::search::{

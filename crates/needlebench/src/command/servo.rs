@@ -55,7 +55,7 @@ pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus, Failure> {
     let folder = arguments.out.join(&resolved.scenario.name).join("servo");
     let _taken = ResultsFolder::take(&folder)?;
     let (described, posture) = posture(&resolved)?;
-    let servo = needlebench_bench::servo_of(&resolved);
+    let servo = needlebench_uncertainty::servo_of(&resolved);
     let timestep_s = resolved.scenario.engines.timestep_ms * 1e-3;
     let linear = Linear::new(&servo, &posture, timestep_s);
     let margins = Margins::new(&servo, &posture, timestep_s);

@@ -10,13 +10,13 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use needlebench_bench::accuracy::{AccuracyError, accuracy_of_study, check_study};
-use needlebench_bench::ct::{LastScan, scanned};
-use needlebench_bench::progress::Progress as _;
 use needlebench_bench::study::{
     Assignment, PreparedStudy, StudyCase, StudyEvaluator, assignment, in_words, time_per_case,
 };
 use needlebench_bench::{RunOptions, Runnable};
 use needlebench_input::{Finding, nothing_serves};
+use needlebench_parallel::Progress as _;
+use needlebench_patient::ct::{LastScan, scanned};
 use needlebench_report::files::{FilesError, StudyOutput, write_study};
 use needlebench_report::table::study::{CaseReport, case_text};
 use needlebench_scenario::study::load_study;

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 use needlebench_bench::suggest::{
-    EntrySearch, PlaceSearch, SuggestError, at_place, plan_entry, plan_place, suggest_entries,
-    suggest_places,
+    EntrySearch, PlaceSearch, at_place, plan_entry, plan_place, suggest_entries, suggest_places,
 };
-use needlebench_bench::{Control, Preview, Runnable, Stop};
+use needlebench_bench::{Preview, Runnable};
 use needlebench_input::{Finding, nearest_name, read_text};
+use needlebench_parallel::Control;
+use needlebench_patient::{Stop, SuggestError};
 use needlebench_report::files::{Folder, write_suggestions};
 use needlebench_report::table::suggest::{entries_text, places_text};
 use needlebench_report::write_atomically;

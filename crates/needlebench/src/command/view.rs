@@ -8,9 +8,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use needlebench_bench::ct::{BuildFiles, VOLUME_FILE, imaged};
-use needlebench_bench::{Control, Stop};
 use needlebench_input::Finding;
+use needlebench_parallel::Control;
+use needlebench_patient::Stop;
+use needlebench_patient::ct::{BuildFiles, VOLUME_FILE, imaged};
 use needlebench_scenario::{Overrides, load_scenario};
 use needlebench_show::layout;
 use needlebench_viewer::{Case, Server, Stopper};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use needlebench_bench::routes::RoutePlan;
+use needlebench_patient::routes::RoutePlan;
 use needlebench_show::chart::{Anchor, Chart, Paint, Rgb, Sample, legend, mixed};
 use serde::Serialize;
 

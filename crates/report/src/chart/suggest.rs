@@ -235,9 +235,9 @@ mod tests {
     use std::path::Path;
     use std::sync::atomic::AtomicBool;
 
-    use needlebench_bench::Control;
-    use needlebench_bench::progress::Silent;
     use needlebench_bench::suggest::{suggest_entries, suggest_places};
+    use needlebench_parallel::Control;
+    use needlebench_parallel::Silent;
     use needlebench_scenario::{Overrides, ScenarioFamily};
 
     use super::*;

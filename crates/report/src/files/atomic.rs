@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use needlebench_imaging::write::stream;
+use needlebench_volume::write::stream;
 
 /// Writes a file beside its place first and then renames it, so that a partial file is never visible.
 /// Who may read it is decided by the user's mask, as of any file.

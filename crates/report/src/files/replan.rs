@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
-use needlebench_bench::progress::Progress;
 use needlebench_bench::study::{PreparedStudy, ReplanControl, Replanned, replan_draw, replanned};
 use needlebench_input::sha256_hex;
+use needlebench_parallel::Progress;
 use needlebench_scenario::study::StudyMode;
 use needlebench_study::ParquetResults;
 use needlebench_study::statistics::Summary;

@@ -1,6 +1,6 @@
 //! Files of planned needle paths.
 
-use needlebench_bench::routes::RoutePlan;
+use needlebench_patient::routes::RoutePlan;
 
 use super::error::FilesError;
 use super::folder::Folder;

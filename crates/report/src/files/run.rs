@@ -3,11 +3,11 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use needlebench_bench::progress::Progress;
 use needlebench_bench::{EngineRun, EventRun, ScenarioRun};
 use needlebench_engine::Engine;
 use needlebench_evaluation::report::Report;
 use needlebench_export::{Motion, mcap};
+use needlebench_parallel::Progress;
 use needlebench_planning::GoalPlan;
 use needlebench_scenario::ResolvedScenario;
 

@@ -4,12 +4,12 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use needlebench_bench::progress::Progress;
 use needlebench_bench::study::{
     ENGINE_FAILURE, PreparedStudy, Replanned, RobustnessResult, StudyCase, robustness_of,
 };
 use needlebench_cell::{SCAN_ENDS, reason_in_words};
 use needlebench_evaluation::report::Verdict;
+use needlebench_parallel::Progress;
 use needlebench_scenario::requirements::{Requirements, requirement_of};
 use needlebench_show::blocks_text;
 use needlebench_study::statistics::{

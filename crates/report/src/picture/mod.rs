@@ -7,7 +7,7 @@ pub mod room;
 mod slices;
 mod voxels;
 
-use needlebench_bench::ct::ScanBuild;
+use needlebench_patient::ct::ScanBuild;
 use needlebench_render::PictureError;
 
 pub use overview::OVERVIEW;

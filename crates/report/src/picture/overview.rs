@@ -1,10 +1,11 @@
 //! What was found in a scan, as one image: three slices with all outlines, and a legend.
 
 use nalgebra::{Point3, Vector3};
-use needlebench_bench::ct::{OverviewRow, ScanBuild};
+use needlebench_imaging::Surface;
 use needlebench_imaging::markers::DetectedMarker;
-use needlebench_imaging::{Surface, SurfaceTissue};
+use needlebench_patient::ct::{OverviewRow, ScanBuild};
 use needlebench_render::{Image, PictureError, TextSize, signed};
+use needlebench_volume::SurfaceTissue;
 
 use super::slices::{
     AXIAL, CORONAL, Frame, MARKER_COLOR, PAPER, SAGITTAL, SlicePicture, View, color, cross, cut,

@@ -4,10 +4,10 @@
 //! up; views from the front and from the side have the head up. Letters at the edges say so.
 
 use nalgebra::{Point3, Vector3};
-use needlebench_bench::ct::ScanBuild;
 use needlebench_geometry::TriangleMesh;
-use needlebench_imaging::{SurfaceTissue, Volume};
+use needlebench_patient::ct::ScanBuild;
 use needlebench_render::{Image, PictureError, TextSize};
+use needlebench_volume::{SurfaceTissue, Volume};
 
 /// A picture and the name of its file.
 #[derive(Debug, Clone, PartialEq, Eq)]

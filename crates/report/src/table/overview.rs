@@ -1,6 +1,6 @@
 //! What was found in a scan, as a table.
 
-use needlebench_bench::ct::{OverviewAccuracy, OverviewRow, OverviewSource};
+use needlebench_patient::ct::{OverviewAccuracy, OverviewRow, OverviewSource};
 use needlebench_show::{CellAlignment, plain_table};
 
 /// Structures of one tissue of a label map that have a row each; more share one.
@@ -112,7 +112,7 @@ pub(crate) fn accuracy_mm(accuracy: OverviewAccuracy) -> String {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_imaging::SurfaceTissue;
+    use needlebench_volume::SurfaceTissue;
 
     use super::*;
 

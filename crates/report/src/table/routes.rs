@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use needlebench_bench::routes::{ConfigurationAnswer, RouteAnswer, RoutePlan, SAME_ODDS, WhyNot};
-use needlebench_bench::suggest::Refused;
 use needlebench_cell::{part_in_words, reason_in_words};
+use needlebench_patient::Refused;
+use needlebench_patient::routes::{ConfigurationAnswer, RouteAnswer, RoutePlan, SAME_ODDS, WhyNot};
 use needlebench_show::plain_table;
 
 /// Needle paths of the table.

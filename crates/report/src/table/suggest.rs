@@ -3,9 +3,8 @@
 use std::fmt::Write;
 
 use needlebench_bench::preview::ConfigurationPreview;
-use needlebench_bench::suggest::{
-    ENTRY_TERMS, Entry, EntryRule, EntrySearch, PlaceSearch, Refused,
-};
+use needlebench_bench::suggest::{ENTRY_TERMS, Entry, EntryRule, EntrySearch, PlaceSearch};
+use needlebench_patient::Refused;
 
 use needlebench_cell::{part_in_words, reason_in_words};
 use needlebench_show::plain_table;

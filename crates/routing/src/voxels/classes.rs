@@ -1,6 +1,7 @@
 //! What labels mean for a needle.
 
-use needlebench_imaging::{Label, LabelMap, SurfaceTissue, structure_of};
+use needlebench_imaging::Label;
+use needlebench_volume::{LabelMap, SurfaceTissue, structure_of};
 
 use super::blocks::BodySide;
 use crate::Obstacle;

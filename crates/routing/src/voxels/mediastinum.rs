@@ -1,6 +1,7 @@
 //! The space between the lungs, which no label map has to name.
 
-use needlebench_imaging::{IndexBox, LabelMap};
+use needlebench_imaging::IndexBox;
+use needlebench_volume::LabelMap;
 
 use super::classes::{Classes, Kind};
 

@@ -12,11 +12,11 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, Vector3};
 use needlebench_imaging::{
-    Components, Connectivity, DistanceField, DistanceOptions, ImagingError, IndexBox, Label,
-    LabelMap, Mask, Remark, VoxelGrid, opened, structure_of,
+    Components, Connectivity, DistanceField, DistanceOptions, IndexBox, Label, Mask, opened,
 };
 use needlebench_phantom::Phantom;
 use needlebench_scenario::scenario::NeedleRouteSection;
+use needlebench_volume::{LabelMap, Remark, VolumeError, VoxelGrid, structure_of};
 
 use crate::anatomy::Obstacle;
 use blocks::Blocks;
@@ -126,17 +126,17 @@ impl VoxelAnatomy {
         origin_in_ct_m: Vector3<f64>,
         target: Point3<f64>,
         options: &VoxelOptions<'_>,
-    ) -> Result<Self, ImagingError> {
+    ) -> Result<Self, VolumeError> {
         let grid = &labels.grid;
         if !grid.is_aligned() {
-            return Err(ImagingError::refused(
+            return Err(VolumeError::refused(
                 "the label map's axes do not run to the left, the back and the head",
             ));
         }
         let spacing_m = grid.spacing_m();
         let at = grid.index_from_ct(&(target + origin_in_ct_m));
         let centre = voxel_at(&at, grid.size()).ok_or_else(|| {
-            ImagingError::refused("the target is outside the scan")
+            VolumeError::refused("the target is outside the scan")
                 .hint("coordinates are in mm in the scan's frame (left, posterior, superior)")
         })?;
         let reach_m = options.needle_m + options.outside_m;
@@ -180,7 +180,7 @@ impl VoxelAnatomy {
             remarks: Vec::new(),
         };
         if matches!(anatomy.kind_at(centre), Kind::Outside | Kind::Beside) {
-            return Err(ImagingError::refused("the target is outside the body")
+            return Err(VolumeError::refused("the target is outside the body")
                 .hint("coordinates are in mm in the scan's frame (left, posterior, superior)"));
         }
         anatomy.look_over(labels);
@@ -466,7 +466,7 @@ impl VoxelAnatomy {
         })
     }
 
-    fn make_fields(&mut self, options: &VoxelOptions<'_>) -> Result<(), ImagingError> {
+    fn make_fields(&mut self, options: &VoxelOptions<'_>) -> Result<(), VolumeError> {
         let lung = self.target_lung;
         let is_off = |obstacle: Obstacle| options.off.iter().any(|name| name == obstacle.name());
         let bone = self.mask_of(|class| class.kind == Kind::Bone);
@@ -515,14 +515,14 @@ impl VoxelAnatomy {
     }
 
     /// The grid of what is looked at.
-    fn part_grid(&self) -> Result<VoxelGrid, ImagingError> {
+    fn part_grid(&self) -> Result<VoxelGrid, VolumeError> {
         let first = self.within.first.map(|index| index as f64);
         VoxelGrid::new(
             self.within.size(),
             *self.grid.steps_m(),
             self.grid.ct_from_index(&Point3::from(first)),
         )
-        .map_err(|error| ImagingError::refused(error.to_string()))
+        .map_err(|error| VolumeError::refused(error.to_string()))
     }
 
     fn index_of(&self, point: &Point3<f64>) -> Point3<f64> {

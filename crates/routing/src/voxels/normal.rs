@@ -1,7 +1,8 @@
 //! Normals of surfaces that only voxels know.
 
 use nalgebra::{Matrix3, Point3, UnitVector3, Vector3};
-use needlebench_imaging::{IndexBox, LabelMap, VoxelGrid};
+use needlebench_imaging::IndexBox;
+use needlebench_volume::{LabelMap, VoxelGrid};
 
 use super::steps;
 

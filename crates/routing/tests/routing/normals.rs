@@ -1,9 +1,9 @@
 //! The normal of a body that voxels know alone, against balls whose normal is known.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use needlebench_imaging::{LabelMap, VoxelGrid};
 use needlebench_numerics::random::SplitMix64;
 use needlebench_routing::body_normal;
+use needlebench_volume::{LabelMap, VoxelGrid};
 
 const RADIUS_M: f64 = 0.12;
 /// Of 100 places, in slices of 1, 2.5 and 5 mm, 95 are within this, deg: the accuracy that is stated, and a fifth.

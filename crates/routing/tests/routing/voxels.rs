@@ -3,12 +3,12 @@
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use needlebench_imaging::{LabelMap, VoxelGrid};
 use needlebench_routing::{
     Anatomy, Exit, Nearest, Obstacle, Ray, Route, RouteRule, RouteRules, VoxelAnatomy,
     VoxelOptions, apart, evenly, refined, search,
 };
 use needlebench_scenario::scenario::OddsSection;
+use needlebench_volume::{LabelMap, VoxelGrid};
 
 static GO: AtomicBool = AtomicBool::new(false);
 

@@ -9,14 +9,14 @@ use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
 
 use nalgebra::Point3;
-use needlebench_bench::Control;
-use needlebench_bench::ct::{BuildFiles, BuildOptions, Room, USUAL_ROOM, build, write_patient};
-use needlebench_bench::progress::Silent;
-use needlebench_imaging::read::{Description, ReadVolume};
-use needlebench_imaging::{LesionSeed, Volume, VoxelGrid};
+use needlebench_imaging::LesionSeed;
+use needlebench_parallel::{Control, Silent};
+use needlebench_patient::ct::{BuildFiles, BuildOptions, Room, USUAL_ROOM, build, write_patient};
 use needlebench_scenario::scenario::{GoalSection, Target};
 use needlebench_scenario::{Overrides, resolve_open_scenario};
 use needlebench_viewer::{Case, Server, Stopper};
+use needlebench_volume::read::{Description, ReadVolume};
+use needlebench_volume::{Volume, VoxelGrid};
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -1,13 +1,13 @@
 //! What the programs of checks of scans share.
 
-use needlebench_imaging::ImagingError;
+use needlebench_volume::VolumeError;
 use serde_json::{Value, json};
 
 /// The answer about what is not read.
-pub fn refused(error: ImagingError) -> Value {
+pub fn refused(error: VolumeError) -> Value {
     match error {
-        ImagingError::Interrupted => json!({"refused": "interrupted"}),
-        ImagingError::Refused {
+        VolumeError::Interrupted => json!({"refused": "interrupted"}),
+        VolumeError::Refused {
             place,
             message,
             hint,

@@ -412,7 +412,7 @@ fn skin_without_a_marker_has_none_and_bad_models_are_refused() {
         1,
         &AtomicBool::new(true),
     );
-    assert_eq!(stopped.unwrap_err(), ImagingError::Interrupted);
+    assert_eq!(stopped.unwrap_err(), VolumeError::Interrupted);
 }
 
 #[test]

@@ -2,8 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_numerics::random::NormalPairs;
-
-use crate::{Volume, VoxelGrid};
+use needlebench_volume::{Volume, VoxelGrid};
 
 /// Points per pixel along each direction.
 const FINE: usize = 5;

@@ -1,8 +1,7 @@
 //! How well the centroid of a lesion is known.
 
 use nalgebra::{Matrix3, Vector3};
-
-use crate::volume::Volume;
+use needlebench_volume::Volume;
 
 use super::Lesion;
 

@@ -1,11 +1,10 @@
 //! What of a box is the lesion.
 
 use nalgebra::Point3;
+use needlebench_volume::{VolumeError, VoxelGrid};
 
 use crate::components::{Components, Connectivity};
 use crate::distance::{DistanceField, DistanceOptions};
-use crate::error::ImagingError;
-use crate::grid::VoxelGrid;
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::{closed, dilated, opened};
 use crate::segment::{LUNG_LEVEL_HU, Scan};
@@ -88,7 +87,7 @@ impl<'a> Grower<'a> {
         local: &'a Local,
         at: [usize; 3],
         lung_hu: Option<i16>,
-    ) -> Result<Self, ImagingError> {
+    ) -> Result<Self, VolumeError> {
         let mut grower = Self {
             scan: Scan {
                 volume: &local.volume,
@@ -119,7 +118,7 @@ impl<'a> Grower<'a> {
             LEAST_CONTRAST_HU
         };
         if grower.contrast() < least {
-            return Err(ImagingError::refused(format!(
+            return Err(VolumeError::refused(format!(
                 "at {} HU it cannot be separated from its surroundings at {} HU",
                 grower.median_hu, grower.around_hu
             ))
@@ -143,7 +142,7 @@ impl<'a> Grower<'a> {
     }
 
     /// To the nearest voxel that is denser than lung. Its mean with its neighbours counts, for noise.
-    fn move_to_dense(&mut self, lung_hu: Option<i16>) -> Result<(), ImagingError> {
+    fn move_to_dense(&mut self, lung_hu: Option<i16>) -> Result<(), VolumeError> {
         let level = lung_hu.map_or(LUNG_LEVEL_HU, |hu| f64::from(hu) + LEAST_IN_LUNG_HU);
         let distance = |to: [usize; 3]| -> f64 {
             (0..3)
@@ -162,7 +161,7 @@ impl<'a> Grower<'a> {
                 self.at = at;
                 Ok(())
             }
-            None => Err(ImagingError::refused(format!(
+            None => Err(VolumeError::refused(format!(
                 "the point is in air, {} HU, with nothing denser than {level:.0} HU within {:.0} mm",
                 self.scan.hu(self.at),
                 1e3 * BESIDE_M
@@ -194,7 +193,7 @@ impl<'a> Grower<'a> {
         &self,
         hull: Option<&Mask>,
         bounding: Bounding,
-    ) -> Result<Grown, ImagingError> {
+    ) -> Result<Grown, VolumeError> {
         self.scan.check()?;
         let level_hu = self.level_at(bounding.level);
         let whole = IndexBox::whole(self.local.body.size());
@@ -262,7 +261,7 @@ impl<'a> Grower<'a> {
     }
 
     /// Uphill in the distance to the surface, from the seed: the middle of the largest ball there, and its radius.
-    fn deepest(&self, region: &Mask) -> Result<([usize; 3], f64), ImagingError> {
+    fn deepest(&self, region: &Mask) -> Result<([usize; 3], f64), VolumeError> {
         let seed = IndexBox {
             first: self.at,
             last: self.at,
@@ -271,7 +270,7 @@ impl<'a> Grower<'a> {
         let bounds = bounds.widened([1; 3], region.size());
         let part = region.cropped(&bounds);
         let grid = VoxelGrid::aligned(part.size(), self.scan.spacing_m, Point3::origin())
-            .map_err(|error| ImagingError::refused(error.to_string()))?;
+            .map_err(|error| VolumeError::refused(error.to_string()))?;
         let options = DistanceOptions {
             cap_m: super::REACHES_M[2],
             threads: 1,

@@ -1,13 +1,12 @@
 //! The part of a scan around a lesion, with slices in between.
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use needlebench_volume::{NotAGrid, Volume, VoxelGrid};
 
-use crate::grid::{NotAGrid, VoxelGrid};
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::closed;
 use crate::segment::{Scan, Segmentation};
 use crate::spacing::whole;
-use crate::volume::Volume;
 
 /// Slices that are put in between, at most: 5 mm over pixels of 0.6 mm.
 const MOST_PARTS: usize = 8;

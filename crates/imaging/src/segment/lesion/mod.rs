@@ -9,12 +9,10 @@ mod spread;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use needlebench_volume::{NotAGrid, Remark, Volume, VolumeError};
 
-use crate::error::{ImagingError, Remark};
-use crate::grid::NotAGrid;
 use crate::mask::{IndexBox, Mask};
 use crate::spacing::{orthogonal, whole};
-use crate::volume::Volume;
 
 use super::{Scan, Segmentation};
 pub(crate) use accuracy::centre_covariance_m2;
@@ -94,7 +92,7 @@ pub(crate) fn grow_lesion(
     seed: &LesionSeed,
     cancel: &AtomicBool,
     remarks: &mut Vec<Remark>,
-) -> Result<Lesion, ImagingError> {
+) -> Result<Lesion, VolumeError> {
     let scan = Scan {
         volume,
         spacing_m: orthogonal(&volume.grid)?,
@@ -117,23 +115,23 @@ fn voxel_of(
     scan: &Scan<'_>,
     found: &Segmentation,
     seed: &LesionSeed,
-) -> Result<[usize; 3], ImagingError> {
+) -> Result<[usize; 3], VolumeError> {
     let hint = "points are in millimetres, in the patient's LPS frame";
     let index = scan.volume.grid.index_from_ct(&seed.point_m);
     let size = scan.size();
     let inside = |axis: usize| (-0.5..size[axis] as f64 - 0.5).contains(&index[axis]);
     if !(0..3).all(inside) {
-        return Err(ImagingError::refused("the point is outside the volume").hint(hint));
+        return Err(VolumeError::refused("the point is outside the volume").hint(hint));
     }
     let voxel = [0, 1, 2].map(|axis| whole(index[axis].round()).min(size[axis] - 1));
     if !found.body.mask.get(voxel) {
-        return Err(ImagingError::refused("the point is outside the body").hint(hint));
+        return Err(VolumeError::refused("the point is outside the body").hint(hint));
     }
     Ok(voxel)
 }
 
-fn not_a_grid(error: &NotAGrid) -> ImagingError {
-    ImagingError::refused(error.to_string())
+fn not_a_grid(error: &NotAGrid) -> VolumeError {
+    VolumeError::refused(error.to_string())
 }
 
 fn grow(
@@ -141,7 +139,7 @@ fn grow(
     found: &Segmentation,
     seed: &LesionSeed,
     remarks: &mut Vec<Remark>,
-) -> Result<Lesion, ImagingError> {
+) -> Result<Lesion, VolumeError> {
     let voxel = voxel_of(scan, found, seed)?;
     let mut reaches = REACHES_M.into_iter().peekable();
     let mut refused = None;
@@ -149,7 +147,7 @@ fn grow(
         let reach_m = reaches.next().unwrap_or(REACHES_M[0]);
         let (lesion, goes_on) = match within(scan, found, seed, voxel, reach_m) {
             Ok(lesion) => lesion,
-            Err(ImagingError::Interrupted) => return Err(ImagingError::Interrupted),
+            Err(VolumeError::Interrupted) => return Err(VolumeError::Interrupted),
             Err(error) => {
                 // A mass that fills the box has nothing around it there.
                 let first = refused.get_or_insert(error);
@@ -185,7 +183,7 @@ fn grow(
 const FARTHEST_FROM_SEED_M: f64 = 5e-3;
 
 /// Refuses a lesion that is not where the point is.
-fn check_at_seed(scan: &Scan<'_>, lesion: &Lesion, seed: &LesionSeed) -> Result<(), ImagingError> {
+fn check_at_seed(scan: &Scan<'_>, lesion: &Lesion, seed: &LesionSeed) -> Result<(), VolumeError> {
     let at = scan.volume.grid.index_from_ct(&seed.point_m);
     // To the voxel's nearer side.
     let from_seed_m = lesion.mask.voxels().map(|voxel| {
@@ -199,7 +197,7 @@ fn check_at_seed(scan: &Scan<'_>, lesion: &Lesion, seed: &LesionSeed) -> Result<
     if nearest_m <= FARTHEST_FROM_SEED_M {
         return Ok(());
     }
-    Err(ImagingError::refused(format!(
+    Err(VolumeError::refused(format!(
         "what is left of it without wall and vessels begins {:.1} mm from the point",
         1e3 * nearest_m
     ))
@@ -213,7 +211,7 @@ fn bounded<'a>(
     found: &Segmentation,
     local: &'a Local,
     at: [usize; 3],
-) -> Result<(Grower<'a>, Grown, Option<Mask>, f64), ImagingError> {
+) -> Result<(Grower<'a>, Grown, Option<Mask>, f64), VolumeError> {
     for wall_m in WALL_RADII_M {
         let hull = local.lung_hull(scan, found, at, wall_m);
         let Some(lung_hu) = found.lungs.air_hu.filter(|_| hull.is_some()) else {
@@ -242,7 +240,7 @@ fn within(
     seed: &LesionSeed,
     voxel: [usize; 3],
     reach_m: f64,
-) -> Result<(Lesion, bool), ImagingError> {
+) -> Result<(Lesion, bool), VolumeError> {
     let reach = [0, 1, 2].map(|axis| scan.voxels_across(reach_m, axis) + 1);
     let bounds = IndexBox {
         first: voxel,

@@ -3,12 +3,11 @@
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::Matrix3;
+use needlebench_volume::{Volume, VolumeError};
 
-use crate::error::ImagingError;
 use crate::mask::{IndexBox, Mask};
 use crate::segment::{Levels, Scan, Segmentation};
 use crate::spacing::orthogonal;
-use crate::volume::Volume;
 
 use super::local::Local;
 use super::{Lesion, MARGIN, not_a_grid};
@@ -22,7 +21,7 @@ impl Lesion {
         bounds: IndexBox,
         mask: &Mask,
         cancel: &AtomicBool,
-    ) -> Result<Self, ImagingError> {
+    ) -> Result<Self, VolumeError> {
         let scan = Scan {
             volume,
             spacing_m: orthogonal(&volume.grid)?,

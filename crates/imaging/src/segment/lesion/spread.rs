@@ -1,8 +1,8 @@
 //! How far the centroid of a lesion moves from one way to bound it to another.
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use needlebench_volume::VolumeError;
 
-use crate::error::ImagingError;
 use crate::mask::Mask;
 
 use super::grower::{Bounding, Grower, Grown, USUAL};
@@ -20,11 +20,11 @@ pub(super) fn of(
     usual: &Grown,
     hull: Option<&Mask>,
     wider: Option<&Mask>,
-) -> Result<Matrix3<f64>, ImagingError> {
+) -> Result<Matrix3<f64>, VolumeError> {
     let Some(from) = centroid_m(local, &usual.mask) else {
         return Ok(Matrix3::zeros());
     };
-    let moved = |hull: Option<&Mask>, bounding: Bounding| -> Result<Matrix3<f64>, ImagingError> {
+    let moved = |hull: Option<&Mask>, bounding: Bounding| -> Result<Matrix3<f64>, VolumeError> {
         let other = grower.grow(hull, bounding)?;
         let away = centroid_m(local, &other.mask).map_or(Vector3::zeros(), |to| to - from);
         Ok(away * away.transpose())

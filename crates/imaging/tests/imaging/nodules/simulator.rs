@@ -1,8 +1,9 @@
 //! Simulated nodules: analytic solids, sampled within each voxel, blurred and with noise. Nothing here is of the crate.
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use needlebench_imaging::{LesionSeed, Volume, VoxelGrid};
+use needlebench_imaging::LesionSeed;
 use needlebench_numerics::random::NormalPairs;
+use needlebench_volume::{Volume, VoxelGrid};
 
 const MM: f64 = 1e-3;
 

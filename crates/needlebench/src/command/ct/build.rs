@@ -7,16 +7,16 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point3, Vector3};
-use needlebench_bench::ct::{
-    BuildFiles, BuildOptions, BuildReport, GivenLabels, KnownMarkers, PatientFrame, Registered,
-    Room, SLICES, ScanBuild, SetAside, WrittenPatient, build, write_patient,
-};
-use needlebench_bench::{Control, Stop};
 use needlebench_imaging::markers::MarkerModel;
-use needlebench_imaging::read::{ReadVolume, read_label_names};
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker, Registration};
 use needlebench_imaging::{AssumedBody, Label, LesionSeed, Outside, SurfaceSizes};
 use needlebench_input::Finding;
+use needlebench_parallel::Control;
+use needlebench_patient::Stop;
+use needlebench_patient::ct::{
+    BuildFiles, BuildOptions, BuildReport, GivenLabels, KnownMarkers, PatientFrame, Registered,
+    Room, SLICES, ScanBuild, SetAside, WrittenPatient, build, write_patient,
+};
 use needlebench_report::picture::{OVERVIEW, SlicePicture, scan_pictures};
 use needlebench_report::table::overview::overview_text;
 use needlebench_scenario::scenario::{GoalSection, Posture, Target};
@@ -24,6 +24,7 @@ use needlebench_scenario::{
     MarkerFrame, MarkerList, Overrides, load_open_scenario, name_from_file, resolve_open_scenario,
 };
 use needlebench_show::layout;
+use needlebench_volume::read::{ReadVolume, read_label_names};
 use serde::Serialize;
 
 use super::info::ReadArguments;
@@ -433,7 +434,7 @@ fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, St
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         (load_open_scenario(path, overrides)?, folder)
     } else {
-        let text = needlebench_bench::ct::USUAL_ROOM;
+        let text = needlebench_patient::ct::USUAL_ROOM;
         let open = resolve_open_scenario("room.toml", text, Path::new(""), overrides)?;
         (open, PathBuf::new())
     };

@@ -6,11 +6,11 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
 use clap::Args;
-use needlebench_bench::Stop;
-use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_volume};
-use needlebench_imaging::{HuHistogram, ImagingError, Orientation, Remark};
 use needlebench_input::Finding;
+use needlebench_patient::Stop;
 use needlebench_show::layout;
+use needlebench_volume::read::{Description, ReadOptions, ReadVolume, read_volume};
+use needlebench_volume::{HuHistogram, Orientation, Remark, VolumeError};
 use serde::Serialize;
 
 use crate::command::{print_json, print_text};
@@ -47,11 +47,7 @@ pub(crate) struct ReadArguments {
 
 impl ReadArguments {
     /// Reads a CT.
-    pub(crate) fn read(
-        &self,
-        path: &Path,
-        cancel: &AtomicBool,
-    ) -> Result<ReadVolume, ImagingError> {
+    pub(crate) fn read(&self, path: &Path, cancel: &AtomicBool) -> Result<ReadVolume, VolumeError> {
         let options = ReadOptions {
             series: self.series.clone(),
             fill_gaps: self.fill_gaps,

@@ -1,11 +1,10 @@
 //! How a patient lies in the room: as in the scanner, unless something says otherwise.
 
-use needlebench_bench::ct::{PatientFrame, ScanBuild};
-use needlebench_imaging::Remark;
 use needlebench_imaging::registration::ReferenceFrame;
-use needlebench_imaging::{Lying, PatientPosition};
+use needlebench_patient::ct::{PatientFrame, ScanBuild};
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::scenario::{GantrySection, PhantomSection, Posture, Scenario};
+use needlebench_volume::{Lying, PatientPosition, Remark};
 
 fn posture(lying: Lying) -> Posture {
     match lying {

@@ -6,15 +6,15 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result};
 use clap::Args;
 use nalgebra::Vector3;
-use needlebench_bench::ct::{BuiltFolder, OverviewRow, ROUTES_FILE, SCENARIO_FILE, unlabelled};
-use needlebench_bench::routes::{
-    RoutePlan, RouteTask, SOLID_DIRECTIONS, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free,
-    plan_routes, rank,
-};
-use needlebench_bench::suggest::SuggestError;
-use needlebench_bench::{Control, Stop};
-use needlebench_imaging::Remark;
+use needlebench_bench::rank_route;
 use needlebench_input::{Finding, read_text};
+use needlebench_parallel::Control;
+use needlebench_patient::ct::{BuiltFolder, OverviewRow, ROUTES_FILE, SCENARIO_FILE, unlabelled};
+use needlebench_patient::routes::{
+    RoutePlan, RouteTask, SOLID_DIRECTIONS, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free,
+    plan_routes,
+};
+use needlebench_patient::{Stop, SuggestError};
 use needlebench_report::files::{Folder, write_route_maps};
 use needlebench_report::table::overview::unlabelled_text;
 use needlebench_report::table::routes::routes_text;
@@ -24,6 +24,7 @@ use needlebench_scenario::{
     OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, load_open_scenario, resolve_scenario,
 };
 use needlebench_show::layout;
+use needlebench_volume::Remark;
 use serde::Serialize;
 
 use crate::arguments::{PicturesArguments, RobotArguments};
@@ -468,7 +469,7 @@ fn rank_by_runs(
         if plan.robot_not_asked.is_some() {
             continue;
         }
-        match rank(resolved, plan, control) {
+        match rank_route(resolved, plan, control) {
             Ok(()) => {}
             Err(SuggestError::Interrupted) => return Err(Stop::Interrupted),
             Err(error) => not_ranked(plan, &error.to_string()),

@@ -6,13 +6,11 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
-use needlebench_bench::ct::{
+use needlebench_input::{FileKind, Finding, read_text};
+use needlebench_parallel::Progress;
+use needlebench_patient::ct::{
     CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan, marker_list,
 };
-use needlebench_bench::progress::Progress;
-use needlebench_imaging::ImagingError;
-use needlebench_imaging::write::{DicomSeries, write_dicom, write_label_nifti, write_nifti};
-use needlebench_input::{FileKind, Finding, read_text};
 use needlebench_phantom::{Phantom, PhantomParameters, SIZE_PRESETS};
 use needlebench_report::write_atomically;
 use needlebench_scenario::scenario::MarkerKind;
@@ -20,6 +18,8 @@ use needlebench_scenario::{ResolvedScenario, load_scenario};
 use needlebench_synthesis::{
     Kernel, Noise, Overshoot, ScanPreset, Scanner, SliceProfile, Streaks, label, synthesise_watched,
 };
+use needlebench_volume::VolumeError;
+use needlebench_volume::write::{DicomSeries, write_dicom, write_label_nifti, write_nifti};
 use serde::Serialize;
 
 use crate::arguments::RobotArguments;
@@ -255,7 +255,7 @@ struct Made<'m> {
     schema_version: u32,
     folder: String,
     files: Vec<String>,
-    truth: &'m needlebench_bench::ct::ScanTruth,
+    truth: &'m needlebench_patient::ct::ScanTruth,
 }
 
 #[derive(Debug, Serialize)]
@@ -280,10 +280,10 @@ pub(crate) fn synth(arguments: &SynthArguments) -> Result<ExitStatus, Failure> {
             write_truth(&arguments.out, &scan, &files, arguments)?;
             Ok(ExitStatus::Success)
         }
-        Err(ImagingError::Interrupted) => Err(Failure::interrupted(
+        Err(VolumeError::Interrupted) => Err(Failure::interrupted(
             "interrupted: incomplete files were not written",
         )),
-        Err(ImagingError::Refused {
+        Err(VolumeError::Refused {
             place,
             message,
             hint,
@@ -342,7 +342,7 @@ fn described(arguments: &SynthArguments, subject: &Subject) -> Result<SyntheticS
     let path = &arguments.subject;
     let refused = |message: String| Finding::new(path.display().to_string(), message);
     let order = order(arguments);
-    let error = |error: ImagingError| refused(error.to_string());
+    let error = |error: VolumeError| refused(error.to_string());
     match subject {
         Subject::Phantom(phantom) => {
             SyntheticScan::new(&CtSubject::of_phantom(path, phantom), &order).map_err(error)
@@ -451,7 +451,7 @@ fn make(
     scan: &SyntheticScan,
     cancel: &AtomicBool,
     progress: &TerminalProgress,
-) -> Result<Vec<String>, ImagingError> {
+) -> Result<Vec<String>, VolumeError> {
     let threads = arguments.jobs.map_or_else(
         || std::thread::available_parallelism().map_or(1, usize::from),
         usize::from,

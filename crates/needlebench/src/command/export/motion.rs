@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use needlebench_bench::Control;
 use needlebench_bench::motion::{MotionChoice, NoMotion, WorkingMotion};
 use needlebench_export::{
     ExportError, ExportedFile, Motion, TrajectoryNotation, mcap, motion_script, trajectory,
 };
 use needlebench_input::Finding;
+use needlebench_parallel::Control;
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::scenario::EngineName;
 

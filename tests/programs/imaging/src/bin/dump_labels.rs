@@ -6,10 +6,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use needlebench_imaging::VoxelGrid;
-use needlebench_imaging::read::{ReadOptions, read_labels, read_volume};
-use needlebench_imaging::write::write_seg_nrrd;
 use needlebench_programs_imaging::refused;
+use needlebench_volume::VoxelGrid;
+use needlebench_volume::read::{ReadOptions, read_labels, read_volume};
+use needlebench_volume::write::write_seg_nrrd;
 use serde_json::{Value, json};
 
 fn main() {

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use needlebench_imaging::read::{ReadOptions, read_volume};
 use needlebench_programs_imaging::refused;
+use needlebench_volume::read::{ReadOptions, read_volume};
 use serde_json::{Value, json};
 
 fn main() {

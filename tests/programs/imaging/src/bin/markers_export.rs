@@ -21,7 +21,7 @@ struct Case {
     target_m: [f64; 3],
 }
 
-fn answer(case: &Case) -> Result<Value, needlebench_imaging::ImagingError> {
+fn answer(case: &Case) -> Result<Value, needlebench_volume::VolumeError> {
     let matrix = |place: &Place| Matrix3::from(place.covariance_m2);
     let detected: Vec<_> = case
         .detected

@@ -9,11 +9,11 @@ use std::time::Instant;
 
 use nalgebra::{Matrix4, Point3};
 use needlebench_imaging::markers::{DetectedMarker, MarkerModel, Options, find_markers};
-use needlebench_imaging::read::{ReadOptions, read_volume};
 use needlebench_imaging::registration::{
     MatchOptions, ReferenceFrame, ReferenceMarker, match_markers, register_weighted,
 };
-use needlebench_imaging::resample;
+use needlebench_volume::read::{ReadOptions, read_volume};
+use needlebench_volume::resample;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

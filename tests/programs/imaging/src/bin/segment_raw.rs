@@ -13,9 +13,9 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::Point3;
 use needlebench_imaging::{
     Components, Connectivity, DistanceField, DistanceOptions, FieldOfView, IndexBox, LesionSeed,
-    Levels, Lying, Mask, ReconstructOptions, Volume, VoxelGrid, dilated, eroded, label_map,
-    reconstruct, segment,
+    Levels, Mask, ReconstructOptions, dilated, eroded, label_map, reconstruct, segment,
 };
+use needlebench_volume::{Lying, Volume, VoxelGrid};
 
 type Failure = Box<dyn std::error::Error>;
 

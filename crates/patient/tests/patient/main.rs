@@ -1,0 +1,3 @@
+//! Patients, from outside the crate.
+
+mod scan_orders;
