@@ -36,6 +36,12 @@ struct Nearest {
     primitive: u32,
 }
 
+/// At a sample where nothing is.
+const NOTHING: Nearest = Nearest {
+    nearness: f32::NEG_INFINITY,
+    primitive: NONE,
+};
+
 /// A translucent thing at a sample.
 #[derive(Debug, Clone, Copy)]
 struct Fragment {
@@ -148,9 +154,9 @@ struct Frame<'a> {
     before: u32,
     materials: Vec<Material>,
     primitives: Vec<Primitive>,
-    nearest: Vec<Nearest>,
-    /// First fragment of each sample; empty when nothing is translucent.
-    first: Vec<u32>,
+    nearest: Tiles<Nearest>,
+    /// First fragment of each sample.
+    first: Tiles<u32>,
     fragments: Vec<Fragment>,
 }
 
@@ -160,15 +166,8 @@ impl<'a> Frame<'a> {
             columns: view.width_px * SAMPLES_PER_PIXEL,
             rows: view.height_px * SAMPLES_PER_PIXEL,
         };
-        let nothing = Nearest {
-            nearness: f32::NEG_INFINITY,
-            primitive: NONE,
-        };
         let before = under.map_or(0, Frame::count);
-        let mut nearest = under.map_or_else(
-            || vec![nothing; grid.columns * grid.rows],
-            |under| under.nearest.clone(),
-        );
+        let mut nearest = Tiles::new(grid);
         let mut assembler = Assembler::new(view, before);
 
         let surfaces: Vec<_> = scene
@@ -183,8 +182,9 @@ impl<'a> Frame<'a> {
             .collect();
         let mut solid = |primitive, corners| {
             rasterise(corners, Facing::Both, grid, |sample, nearness| {
-                if nearness > nearest[sample].nearness {
-                    nearest[sample] = Nearest {
+                let known = nearest.at(sample, |sample| opaque(None, under, sample));
+                if nearness > known.nearness {
+                    *known = Nearest {
                         nearness,
                         primitive,
                     };
@@ -200,24 +200,20 @@ impl<'a> Frame<'a> {
 
         let mut fragments: Vec<Fragment> = Vec::new();
         let is_seen = |material: &Material| !material.is_opaque() && material.opacity > 0.0;
-        let any = surfaces.iter().any(|(_, material)| is_seen(material))
-            || lines.iter().any(|(_, material)| is_seen(material));
-        let mut first = if any {
-            vec![NONE; nearest.len()]
-        } else {
-            Vec::new()
-        };
+        let mut first = Tiles::new(grid);
         let mut translucent = |primitive, corners| {
             rasterise(corners, Facing::Front, grid, |sample, nearness| {
                 // Indices beyond 32 bits would need tens of gigabytes; such fragments are dropped.
                 let position = u32::try_from(fragments.len()).unwrap_or(NONE);
-                if nearness > nearest[sample].nearness && position != NONE {
+                let behind = opaque(Some(&nearest), under, sample);
+                if nearness > behind.nearness && position != NONE {
+                    let first = first.at(sample, |_| NONE);
                     fragments.push(Fragment {
                         nearness,
                         primitive,
-                        next: first[sample],
+                        next: *first,
                     });
-                    first[sample] = position;
+                    *first = position;
                 }
             });
         };
@@ -276,15 +272,13 @@ impl<'a> Frame<'a> {
         for (x, seen) in row.iter_mut().enumerate() {
             let samples = self.samples(x, y);
             let stays = |known: &Known<'_>| {
-                !seen
-                    .shadow
-                    .is_some_and(|cell| known.shaded_anew[usize::from(cell)])
-                    && !self.has_new(&samples)
+                let is_new = |cell| known.shaded_anew[usize::from(cell)];
+                !seen.shadow.is_some_and(is_new) && !self.has_new(&samples)
             };
             if lit.known.as_ref().is_some_and(stays) {
                 continue;
             }
-            let nearest = samples.map(|sample| self.nearest[sample]);
+            let nearest = samples.map(|sample| self.nearest(sample));
             let farthest = nearest
                 .iter()
                 .map(|near| near.nearness)
@@ -334,6 +328,11 @@ impl<'a> Frame<'a> {
         })
     }
 
+    /// What is opaque at a sample.
+    fn nearest(&self, sample: usize) -> Nearest {
+        opaque(Some(&self.nearest), self.under, sample)
+    }
+
     fn samples(&self, x: usize, y: usize) -> [usize; SAMPLES] {
         let start = y * SAMPLES_PER_PIXEL * self.grid.columns + x * SAMPLES_PER_PIXEL;
         [
@@ -346,7 +345,7 @@ impl<'a> Frame<'a> {
 
     /// Translucent things at a sample, before what is opaque there: those of what is under this, then its own.
     fn fragments(&self, sample: usize) -> impl Iterator<Item = &Fragment> {
-        let nearness = self.nearest[sample].nearness;
+        let nearness = self.nearest(sample).nearness;
         let under = self.under.map(|under| (under, under.first.get(sample)));
         let all = under.into_iter().chain([(self, self.first.get(sample))]);
         all.flat_map(|(frame, first)| {
@@ -378,7 +377,7 @@ impl<'a> Frame<'a> {
 
     /// Whether nothing is translucent.
     fn is_opaque(&self) -> bool {
-        self.first.is_empty() && self.under.is_none_or(|under| under.first.is_empty())
+        self.fragments.is_empty() && self.under.is_none_or(Frame::is_opaque)
     }
 
     /// A primitive with its material.
@@ -414,9 +413,8 @@ impl<'a> Frame<'a> {
     /// Whether another thing begins to the right of or below each sample of a pixel.
     fn outlines(&self, samples: &[usize; SAMPLES], last_column: bool) -> [bool; SAMPLES] {
         let begins = |sample: usize, other: usize| {
-            self.nearest
-                .get(other)
-                .is_some_and(|&other| self.parted(self.nearest[sample], other))
+            other < self.grid.columns * self.grid.rows
+                && self.parted(self.nearest(sample), self.nearest(other))
         };
         let mut outlines = [false; SAMPLES];
         for (place, &sample) in samples.iter().enumerate() {
@@ -425,6 +423,41 @@ impl<'a> Frame<'a> {
                 || begins(sample, sample + self.grid.columns);
         }
         outlines
+    }
+}
+
+/// What is opaque at a sample, of one's own or what was drawn before.
+fn opaque(own: Option<&Tiles<Nearest>>, under: Option<&Frame<'_>>, sample: usize) -> Nearest {
+    let known = own.and_then(|own| own.get(sample)).copied();
+    known
+        .or_else(|| Some(under?.nearest(sample)))
+        .unwrap_or(NOTHING)
+}
+
+/// Samples of a tile.
+const TILE: usize = 128;
+
+/// A value of each sample; tiles in which nothing was drawn take no memory.
+struct Tiles<T>(Vec<Option<Box<[T; TILE]>>>);
+
+impl<T> Tiles<T> {
+    fn new(grid: Grid) -> Self {
+        let tiles = (grid.columns * grid.rows).div_ceil(TILE);
+        Self((0..tiles).map(|_| None).collect())
+    }
+
+    /// The value at a sample, if anything was drawn near it.
+    fn get(&self, sample: usize) -> Option<&T> {
+        let tile = self.0.get(sample / TILE)?.as_ref()?;
+        Some(&tile[sample % TILE])
+    }
+
+    /// The value at a sample; `before` has those of samples that were not drawn at.
+    fn at(&mut self, sample: usize, before: impl Fn(usize) -> T) -> &mut T {
+        let start = sample - sample % TILE;
+        let tile = self.0[sample / TILE]
+            .get_or_insert_with(|| Box::new(std::array::from_fn(|at| before(start + at))));
+        &mut tile[sample % TILE]
     }
 }
 
@@ -461,7 +494,7 @@ impl Looked<'_> {
         let Nearest {
             nearness,
             primitive,
-        } = self.frame.nearest[sample];
+        } = self.frame.nearest(sample);
         let mut light = self.behind;
         if primitive != NONE {
             light = self.lit(primitive, nearness, at_px, pixel).0;
