@@ -56,7 +56,6 @@ impl<'a> RoomPictures<'a> {
         goal: usize,
     ) -> Self {
         let mut scene = backdrop.scene(resolved, &resolved.goals[goal]);
-        scene.surfaces.push(hemisphere(room.sector(goal)));
         for person in &resolved.people.by_goal[goal] {
             let heads = person.statures_m.iter().map(|m| person.eyes_m(*m));
             scene.surfaces.extend(heads.map(|at| ball(at, 0.045, HEAD)));
@@ -112,7 +111,8 @@ impl<'a> RoomPictures<'a> {
         Some(self.stage.picture(&scene))
     }
 
-    /// What the arm occupies of the hemisphere about the entry point.
+    /// The hemisphere about the entry point, and what the arm occupies of it; not on the stage, since both meet in the
+    /// entry point, where the one that is drawn first is behind the other.
     fn add_space(&self, scene: &mut Scene, q: &Joints) {
         let sector = self.room.sector(self.goal);
         let taken = self.room.taken(self.goal, q);
@@ -121,6 +121,7 @@ impl<'a> RoomPictures<'a> {
             world_from_surface: Pose::identity(),
             color_rgba: TAKEN,
         });
+        scene.surfaces.push(hemisphere(sector));
     }
 
     /// People's lines of sight; one label for each stature.
