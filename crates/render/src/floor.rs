@@ -24,20 +24,23 @@ const COLOR: [f32; 3] = [0.93, 0.935, 0.94];
 
 /// A floor ready to be looked at.
 #[derive(Debug)]
-pub(crate) struct FloorView<'a> {
-    floor: &'a Floor,
-    view: &'a View,
+pub(crate) struct FloorView {
+    floor: Floor,
     light: Light,
+    /// Towards the light, in the world.
+    towards_light: Vector3<f64>,
     /// Starts of the rays in the world, m.
     starts: Linear,
     /// Directions of the rays in the world, per metre of depth.
     directions: Linear,
-    /// Shadow, 0 to 1, row by row along y.
+    /// What is over the floor, 0 to 1, row by row along y.
+    cover: Vec<f32>,
+    /// Its shadow, the same with soft rims.
     shadow: Vec<f32>,
 }
 
 /// A vector that changes linearly across the picture, as starts and directions of rays do.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 struct Linear {
     at_zero: Vector3<f64>,
     per_px: [Vector3<f64>; 2],
@@ -63,37 +66,64 @@ pub(crate) struct FloorSample {
     pub nearness: f32,
     pub light: Light,
     pub opacity: f32,
+    /// Cell of the shadow, the first of the four that it is interpolated from.
+    pub shadow: u16,
 }
 
-impl<'a> FloorView<'a> {
+impl FloorView {
     /// `towards_light` is in the world and points upwards. `None` when the floor is seen from below
     /// or has no size.
     pub fn new(
-        floor: &'a Floor,
+        floor: &Floor,
         scene: &Scene,
-        view: &'a View,
+        view: &View,
         towards_light: &Vector3<f64>,
     ) -> Option<Self> {
         let sound = floor.radius_m > 0.0 && floor.spacing_m > 0.0 && view.eye_m.z > floor.z_m;
         let world_from_eye = view.eye_from_world.transpose();
-        sound.then(|| Self {
-            floor,
-            view,
+        if !sound {
+            return None;
+        }
+        let mut cover = vec![0.0; SHADOW_CELLS * SHADOW_CELLS];
+        cast(&mut cover, floor, scene, towards_light);
+        Some(Self {
+            floor: *floor,
             light: color::light(COLOR),
+            towards_light: *towards_light,
             starts: Linear::new(|x_px, y_px| {
                 view.eye_m.coords + world_from_eye * view.ray(x_px, y_px).0
             }),
             directions: Linear::new(|x_px, y_px| world_from_eye * view.ray(x_px, y_px).1),
-            shadow: shadow(floor, scene, towards_light),
+            shadow: softened(&cover),
+            cover,
         })
     }
 
+    /// The same floor with further things over it.
+    pub fn under(&self, things: &Scene) -> Self {
+        let mut cover = self.cover.clone();
+        cast(&mut cover, &self.floor, things, &self.towards_light);
+        Self {
+            shadow: softened(&cover),
+            cover,
+            ..*self
+        }
+    }
+
+    /// By cell of the shadow, whether a place there is shaded otherwise than on another floor.
+    pub fn shaded_unlike(&self, other: &Self) -> Vec<bool> {
+        let differs = |cell: usize| self.shadow.get(cell) != other.shadow.get(cell);
+        (0..self.shadow.len())
+            .map(|cell| corners(cell).into_iter().any(differs))
+            .collect()
+    }
+
     /// What a place of the picture shows of the floor, if that is nearer than `nearness`.
-    pub fn look(&self, [x_px, y_px]: [f64; 2], nearness: f32) -> Option<FloorSample> {
+    pub fn look(&self, view: &View, [x_px, y_px]: [f64; 2], nearness: f32) -> Option<FloorSample> {
         let (start_m, direction) = (self.starts.at(x_px, y_px), self.directions.at(x_px, y_px));
         let depth_m = (self.floor.z_m - start_m.z) / direction.z;
         #[expect(clippy::cast_possible_truncation, reason = "depths are stored as f32")]
-        let floor_nearness = self.view.nearness(depth_m) as f32;
+        let floor_nearness = view.nearness(depth_m) as f32;
         if !(depth_m > 0.0 && depth_m.is_finite() && floor_nearness > nearness) {
             return None;
         }
@@ -115,11 +145,13 @@ impl<'a> FloorView<'a> {
         let fade = ((1.0 - off_center) / 0.6).min(1.0);
         #[expect(clippy::cast_possible_truncation, reason = "colours are f32")]
         let (fade, line) = ((fade * fade * (3.0 - 2.0 * fade)) as f32, line as f32);
-        let dimmed = (1.0 - LINE_DEPTH * line) * (1.0 - SHADOW_DEPTH * self.shadow_at(&hit_m));
+        let (shade, shadow) = self.shadow_at(&hit_m);
+        let dimmed = (1.0 - LINE_DEPTH * line) * (1.0 - SHADOW_DEPTH * shade);
         Some(FloorSample {
             nearness: floor_nearness,
             light: self.light * dimmed,
             opacity: fade,
+            shadow,
         })
     }
 
@@ -135,23 +167,24 @@ impl<'a> FloorView<'a> {
         distinct * (1.1 - off_m / pixel_m.max(1e-9)).clamp(0.0, 1.0)
     }
 
-    /// Shadow at a place of the floor, interpolated.
-    fn shadow_at(&self, at_m: &Point2<f64>) -> f32 {
-        let cells = cells(self.floor, at_m).map(|cell| cell - 0.5);
+    /// Shadow at a place of the floor, interpolated, and the first of the cells that it is from.
+    fn shadow_at(&self, at_m: &Point2<f64>) -> (f32, u16) {
+        let cells = cells(&self.floor, at_m).map(|cell| cell - 0.5);
         let last = (SHADOW_CELLS - 1) as f64;
         let low = cells.map(|cell| cell.floor().clamp(0.0, last - 1.0));
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "clamped to the cells"
+            reason = "clamped to the cells, of which there are 2^16"
         )]
-        let (corner, along) = (
-            low[1] as usize * SHADOW_CELLS + low[0] as usize,
+        let (first, along) = (
+            low[1] as u16 * SHADOW_CELLS as u16 + low[0] as u16,
             [0, 1].map(|axis| (cells[axis] - low[axis]).clamp(0.0, 1.0) as f32),
         );
         let mix = |from: f32, to: f32, along: f32| from + (to - from) * along;
-        let row = |start: usize| mix(self.shadow[start], self.shadow[start + 1], along[0]);
-        mix(row(corner), row(corner + SHADOW_CELLS), along[1])
+        let [a, b, c, d] = corners(usize::from(first)).map(|cell| self.shadow[cell]);
+        let shade = mix(mix(a, b, along[0]), mix(c, d, along[0]), along[1]);
+        (shade, first)
     }
 }
 
@@ -162,9 +195,13 @@ fn cells(floor: &Floor, at_m: &Point2<f64>) -> [f64; 2] {
     [offset_m.x, offset_m.y].map(|offset_m| (offset_m + floor.radius_m) * scale)
 }
 
-/// The shadow that the surfaces of the scene cast on the floor.
-fn shadow(floor: &Floor, scene: &Scene, towards_light: &Vector3<f64>) -> Vec<f32> {
-    let mut cover = vec![0.0; SHADOW_CELLS * SHADOW_CELLS];
+/// A cell of the shadow and its neighbours along x, along y and along both.
+fn corners(cell: usize) -> [usize; 4] {
+    [cell, cell + 1, cell + SHADOW_CELLS, cell + SHADOW_CELLS + 1]
+}
+
+/// Adds the surfaces of the scene to what is over the floor, in the direction of the light.
+fn cast(cover: &mut [f32], floor: &Floor, scene: &Scene, towards_light: &Vector3<f64>) {
     let grid = Grid {
         columns: SHADOW_CELLS,
         rows: SHADOW_CELLS,
@@ -172,7 +209,7 @@ fn shadow(floor: &Floor, scene: &Scene, towards_light: &Vector3<f64>) -> Vec<f32
     let fall = towards_light / towards_light.z;
     for surface in &scene.surfaces {
         let opacity = surface.color_rgba[3].clamp(0.0, 1.0);
-        let cast = |vertex_m: &Point3<f64>| {
+        let fallen = |vertex_m: &Point3<f64>| {
             let world_m = surface.world_from_surface * vertex_m;
             let cast_m = world_m - fall * (world_m.z - floor.z_m).max(0.0);
             let [x, y] = cells(floor, &cast_m.xy()).map(|cell| cell / SAMPLES_PER_PIXEL as f64);
@@ -182,7 +219,7 @@ fn shadow(floor: &Floor, scene: &Scene, towards_light: &Vector3<f64>) -> Vec<f32
                 nearness: 0.0,
             }
         };
-        let casts: Vec<Projected> = surface.mesh.vertices_m.iter().map(cast).collect();
+        let casts: Vec<Projected> = surface.mesh.vertices_m.iter().map(fallen).collect();
         for triangle in &surface.mesh.triangles {
             let corners = triangle.map(|index| casts.get(index as usize).copied());
             if let [Some(a), Some(b), Some(c)] = corners {
@@ -192,10 +229,11 @@ fn shadow(floor: &Floor, scene: &Scene, towards_light: &Vector3<f64>) -> Vec<f32
             }
         }
     }
-    for _ in 0..2 {
-        cover = blurred_transposed(&blurred_transposed(&cover));
-    }
-    cover
+}
+
+/// The shadow of what is over the floor.
+fn softened(cover: &[f32]) -> Vec<f32> {
+    (0..4).fold(cover.to_vec(), |shadow, _| blurred_transposed(&shadow))
 }
 
 /// Blurs along the rows and transposes.

@@ -75,16 +75,19 @@ impl Primitive {
 pub(crate) struct Assembler<'a> {
     view: &'a View,
     guards: [HalfSpace; 5],
+    /// Number of primitives that others have.
+    before: u32,
     pub materials: Vec<Material>,
     pub primitives: Vec<Primitive>,
 }
 
 impl<'a> Assembler<'a> {
-    pub fn new(view: &'a View) -> Self {
+    pub fn new(view: &'a View, before: u32) -> Self {
         let (materials, primitives) = (Vec::new(), Vec::new());
         Self {
             view,
             guards: view.guards(),
+            before,
             materials,
             primitives,
         }
@@ -97,7 +100,7 @@ impl<'a> Assembler<'a> {
 
     fn add_primitive(&mut self, primitive: Primitive) -> u32 {
         self.primitives.push(primitive);
-        index(self.primitives.len() - 1)
+        self.before.saturating_add(index(self.primitives.len() - 1))
     }
 
     /// Calls `draw` with each visible piece of the surface and the primitive it belongs to.

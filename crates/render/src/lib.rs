@@ -25,7 +25,7 @@ mod text;
 
 pub use camera::{Camera, Projection};
 pub use image::{Image, PictureError};
-pub use render::render;
+pub use render::{Stage, render};
 pub use scene::{Anchor, Floor, Label, Line3, Scene, SurfaceInstance};
 pub use sheet::tile;
 pub use text::{TextSize, signed};

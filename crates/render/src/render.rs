@@ -12,7 +12,7 @@ use crate::image::Image;
 use crate::label;
 use crate::lamps::Lamps;
 use crate::raster::{Facing, Grid, SAMPLES_PER_PIXEL, rasterise};
-use crate::scene::Scene;
+use crate::scene::{Label, Scene};
 
 /// No primitive, or no further fragment.
 const NONE: u32 = u32::MAX;
@@ -36,6 +36,12 @@ struct Nearest {
     primitive: u32,
 }
 
+/// At a sample where nothing is.
+const NOTHING: Nearest = Nearest {
+    nearness: f32::NEG_INFINITY,
+    primitive: NONE,
+};
+
 /// A translucent thing at a sample.
 #[derive(Debug, Clone, Copy)]
 struct Fragment {
@@ -47,41 +53,122 @@ struct Fragment {
 
 /// Renders the scene as the camera sees it; the same bytes for the same input.
 pub fn render(scene: &Scene, camera: &Camera) -> Image {
-    let view = View::new(camera);
-    let lamps = Lamps::new(&view);
-    let floor = scene
-        .floor
-        .as_ref()
-        .and_then(|floor| FloorView::new(floor, scene, &view, &lamps.key_in_world));
-    let pixels = Frame::draw(scene, &view).resolve(&view, &lamps, floor.as_ref());
-    let mut image = Image::from_pixels(view.width_px, pixels);
-    label::draw(&mut image, &scene.labels, &view);
-    image
+    let stage = Stage::new(scene, camera);
+    stage.labelled(stage.seen.iter().map(|seen| seen.color), &scene.labels)
+}
+
+/// What several pictures of one camera have in common, drawn once.
+pub struct Stage {
+    view: View,
+    lamps: Lamps,
+    floor: Option<FloorView>,
+    frame: Frame<'static>,
+    /// By pixel, with nothing else there.
+    seen: Vec<Seen>,
+}
+
+/// A pixel of a picture.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    color: [u8; 3],
+    /// Cell of the floor's shadow; none where no floor is seen.
+    shadow: Option<u16>,
+}
+
+impl Stage {
+    /// Of what stands in all pictures. Labels are each picture's own.
+    pub fn new(scene: &Scene, camera: &Camera) -> Self {
+        let view = View::new(camera);
+        let lamps = Lamps::new(&view);
+        let floor = scene
+            .floor
+            .as_ref()
+            .and_then(|floor| FloorView::new(floor, scene, &view, &lamps.key_in_world));
+        let frame = Frame::draw(scene, &view, None);
+        let seen = frame.resolve(&Lit {
+            view: &view,
+            lamps: &lamps,
+            floor: floor.as_ref(),
+            encoder: &Encoder::new(),
+            known: None,
+        });
+        Self {
+            view,
+            lamps,
+            floor,
+            frame,
+            seen,
+        }
+    }
+
+    /// A picture of the stage with more things on it: the same as of one scene of the stage's things and then these,
+    /// but for which of two things is seen that are equally near. There is no other floor than the stage's.
+    pub fn picture(&self, things: &Scene) -> Image {
+        let frame = Frame::draw(things, &self.view, Some(&self.frame));
+        let floor = self.floor.as_ref().map(|floor| floor.under(things));
+        let floors = self.floor.as_ref().zip(floor.as_ref());
+        let shaded_anew = floors.map_or_else(Vec::new, |(old, new)| new.shaded_unlike(old));
+        let seen = frame.resolve(&Lit {
+            view: &self.view,
+            lamps: &self.lamps,
+            floor: floor.as_ref(),
+            encoder: &Encoder::new(),
+            known: Some(Known {
+                seen: &self.seen,
+                shaded_anew: &shaded_anew,
+            }),
+        });
+        self.labelled(seen.into_iter().map(|seen| seen.color), &things.labels)
+    }
+
+    fn labelled(&self, pixels: impl Iterator<Item = [u8; 3]>, labels: &[Label]) -> Image {
+        let mut image = Image::from_pixels(self.view.width_px, pixels.collect());
+        label::draw(&mut image, labels, &self.view);
+        image
+    }
+}
+
+/// In what light a frame is seen.
+struct Lit<'a> {
+    view: &'a View,
+    lamps: &'a Lamps,
+    floor: Option<&'a FloorView>,
+    encoder: &'a Encoder,
+    known: Option<Known<'a>>,
+}
+
+/// What a pixel is like that shows nothing but what was drawn before.
+#[derive(Clone, Copy)]
+struct Known<'a> {
+    seen: &'a [Seen],
+    /// By cell of the floor's shadow, whether it is another one around there.
+    shaded_anew: &'a [bool],
 }
 
 /// Everything visible, sample by sample.
-struct Frame {
+struct Frame<'a> {
     grid: Grid,
+    /// What was drawn before.
+    under: Option<&'a Frame<'a>>,
+    /// Number of primitives that were drawn before.
+    before: u32,
     materials: Vec<Material>,
     primitives: Vec<Primitive>,
-    nearest: Vec<Nearest>,
-    /// First fragment of each sample; empty when nothing is translucent.
-    first: Vec<u32>,
+    nearest: Tiles<Nearest>,
+    /// First fragment of each sample.
+    first: Tiles<u32>,
     fragments: Vec<Fragment>,
 }
 
-impl Frame {
-    fn draw(scene: &Scene, view: &View) -> Self {
+impl<'a> Frame<'a> {
+    fn draw(scene: &Scene, view: &View, under: Option<&'a Frame<'a>>) -> Self {
         let grid = Grid {
             columns: view.width_px * SAMPLES_PER_PIXEL,
             rows: view.height_px * SAMPLES_PER_PIXEL,
         };
-        let nothing = Nearest {
-            nearness: f32::NEG_INFINITY,
-            primitive: NONE,
-        };
-        let mut nearest = vec![nothing; grid.columns * grid.rows];
-        let mut assembler = Assembler::new(view);
+        let before = under.map_or(0, Frame::count);
+        let mut nearest = Tiles::new(grid);
+        let mut assembler = Assembler::new(view, before);
 
         let surfaces: Vec<_> = scene
             .surfaces
@@ -95,8 +182,9 @@ impl Frame {
             .collect();
         let mut solid = |primitive, corners| {
             rasterise(corners, Facing::Both, grid, |sample, nearness| {
-                if nearness > nearest[sample].nearness {
-                    nearest[sample] = Nearest {
+                let known = nearest.at(sample, |sample| opaque(None, under, sample));
+                if nearness > known.nearness {
+                    *known = Nearest {
                         nearness,
                         primitive,
                     };
@@ -112,24 +200,20 @@ impl Frame {
 
         let mut fragments: Vec<Fragment> = Vec::new();
         let is_seen = |material: &Material| !material.is_opaque() && material.opacity > 0.0;
-        let any = surfaces.iter().any(|(_, material)| is_seen(material))
-            || lines.iter().any(|(_, material)| is_seen(material));
-        let mut first = if any {
-            vec![NONE; nearest.len()]
-        } else {
-            Vec::new()
-        };
+        let mut first = Tiles::new(grid);
         let mut translucent = |primitive, corners| {
             rasterise(corners, Facing::Front, grid, |sample, nearness| {
                 // Indices beyond 32 bits would need tens of gigabytes; such fragments are dropped.
                 let position = u32::try_from(fragments.len()).unwrap_or(NONE);
-                if nearness > nearest[sample].nearness && position != NONE {
+                let behind = opaque(Some(&nearest), under, sample);
+                if nearness > behind.nearness && position != NONE {
+                    let first = first.at(sample, |_| NONE);
                     fragments.push(Fragment {
                         nearness,
                         primitive,
-                        next: first[sample],
+                        next: *first,
                     });
-                    first[sample] = position;
+                    *first = position;
                 }
             });
         };
@@ -146,6 +230,8 @@ impl Frame {
         } = assembler;
         Self {
             grid,
+            under,
+            before,
             materials,
             primitives,
             nearest,
@@ -154,35 +240,45 @@ impl Frame {
         }
     }
 
+    /// Number of primitives, of what was drawn before too.
+    fn count(&self) -> u32 {
+        self.before + u32::try_from(self.primitives.len()).unwrap_or(NONE - self.before)
+    }
+
     /// Lights what is seen and mixes the samples of each pixel.
-    fn resolve(&self, view: &View, lamps: &Lamps, floor: Option<&FloorView<'_>>) -> Vec<[u8; 3]> {
-        let encoder = &Encoder::new();
-        let mut pixels = vec![[0; 3]; view.width_px * view.height_px];
+    fn resolve(&self, lit: &Lit<'_>) -> Vec<Seen> {
+        let view = lit.view;
+        let nothing = Seen {
+            color: [0; 3],
+            shadow: None,
+        };
+        let mut pixels = lit.known.map_or_else(
+            || vec![nothing; view.width_px * view.height_px],
+            |known| known.seen.to_vec(),
+        );
         // Pixels do not depend on each other, so the number of threads shows in the time only.
         let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
-        let row = |(): &mut (), y: usize, row: &mut [[u8; 3]]| {
-            self.resolve_row(view, lamps, floor, encoder, y, row);
-        };
+        let row = |(): &mut (), y: usize, row: &mut [Seen]| self.resolve_row(lit, y, row);
         in_parts(threads, &mut pixels, view.width_px, || (), row);
         pixels
     }
 
-    fn resolve_row(
-        &self,
-        view: &View,
-        lamps: &Lamps,
-        floor: Option<&FloorView<'_>>,
-        encoder: &Encoder,
-        y: usize,
-        row: &mut [[u8; 3]],
-    ) {
+    fn resolve_row(&self, lit: &Lit<'_>, y: usize, row: &mut [Seen]) {
+        let view = lit.view;
         let background = BACKGROUND.map(color::light);
         let mut pixel = Pixel::default();
         let along = (y as f32 + 0.5) / view.height_px as f32;
         let behind = background[0] * (1.0 - along) + background[1] * along;
-        for (x, shown_pixel) in row.iter_mut().enumerate() {
+        for (x, seen) in row.iter_mut().enumerate() {
             let samples = self.samples(x, y);
-            let nearest = samples.map(|sample| self.nearest[sample]);
+            let stays = |known: &Known<'_>| {
+                let is_new = |cell| known.shaded_anew[usize::from(cell)];
+                !seen.shadow.is_some_and(is_new) && !self.has_new(&samples)
+            };
+            if lit.known.as_ref().is_some_and(stays) {
+                continue;
+            }
+            let nearest = samples.map(|sample| self.nearest(sample));
             let farthest = nearest
                 .iter()
                 .map(|near| near.nearness)
@@ -191,9 +287,11 @@ impl Frame {
             let looked = Looked {
                 frame: self,
                 view,
-                lamps,
+                lamps: lit.lamps,
                 behind,
-                floor: floor.and_then(|floor| floor.look(center_px, farthest)),
+                floor: lit
+                    .floor
+                    .and_then(|floor| floor.look(view, center_px, farthest)),
             };
             pixel.lit.clear();
             let outlines = self.outlines(&samples, x + 1 == view.width_px);
@@ -210,8 +308,29 @@ impl Frame {
                 })
                 .sum();
             let light = sum / shown as f32;
-            *shown_pixel = encoder.encode(&light);
+            *seen = Seen {
+                color: lit.encoder.encode(&light),
+                shadow: looked.floor.map(|floor| floor.shadow),
+            };
         }
+    }
+
+    /// Whether something was drawn at one of a pixel's samples, or beside it where an outline would be, since what is
+    /// under this.
+    fn has_new(&self, samples: &[usize; SAMPLES]) -> bool {
+        let is_new = |sample: usize| {
+            let opaque = self.nearest.get(sample);
+            opaque.is_some_and(|it| it.primitive >= self.before && it.primitive != NONE)
+                || self.first.get(sample).is_some_and(|first| *first != NONE)
+        };
+        samples.iter().any(|&sample| {
+            is_new(sample) || is_new(sample + 1) || is_new(sample + self.grid.columns)
+        })
+    }
+
+    /// What is opaque at a sample.
+    fn nearest(&self, sample: usize) -> Nearest {
+        opaque(Some(&self.nearest), self.under, sample)
     }
 
     fn samples(&self, x: usize, y: usize) -> [usize; SAMPLES] {
@@ -224,26 +343,54 @@ impl Frame {
         ]
     }
 
+    /// Translucent things at a sample, before what is opaque there: those of what is under this, then its own.
+    fn fragments(&self, sample: usize) -> impl Iterator<Item = &Fragment> {
+        let nearness = self.nearest(sample).nearness;
+        let under = self.under.map(|under| (under, under.first.get(sample)));
+        let all = under.into_iter().chain([(self, self.first.get(sample))]);
+        all.flat_map(|(frame, first)| {
+            let at = |position: &u32| frame.fragments.get(*position as usize);
+            std::iter::successors(first.and_then(at), move |fragment| at(&fragment.next))
+        })
+        .filter(move |fragment| fragment.nearness > nearness)
+    }
+
     /// Whether the samples show the same translucent things; they were drawn in the same order.
     fn same_fragments(&self, samples: &[usize; SAMPLES]) -> bool {
-        if self.first.is_empty() {
+        if self.is_opaque() {
             return true;
         }
-        let mut next = samples.map(|sample| self.first[sample]);
-        while let Some(Fragment { primitive, .. }) = self.fragments.get(next[0] as usize) {
-            for position in &mut next {
-                match self.fragments.get(*position as usize) {
-                    Some(fragment) if fragment.primitive == *primitive => *position = fragment.next,
-                    _ => return false,
-                }
+        let [mut first, mut others @ ..] = samples.map(|sample| self.fragments(sample));
+        loop {
+            let next = first.next().map(|fragment| fragment.primitive);
+            let is_same = |other: &mut _| {
+                Iterator::next(other).map(|fragment: &Fragment| fragment.primitive) == next
+            };
+            if !others.iter_mut().all(is_same) {
+                return false;
+            }
+            if next.is_none() {
+                return true;
             }
         }
-        next == [NONE; SAMPLES]
+    }
+
+    /// Whether nothing is translucent.
+    fn is_opaque(&self) -> bool {
+        self.fragments.is_empty() && self.under.is_none_or(Frame::is_opaque)
+    }
+
+    /// A primitive with its material.
+    fn primitive(&self, index: u32) -> Option<(&Primitive, &Material)> {
+        let Some(own) = index.checked_sub(self.before) else {
+            return self.under?.primitive(index);
+        };
+        let primitive = self.primitives.get(own as usize)?;
+        Some((primitive, self.materials.get(primitive.material as usize)?))
     }
 
     fn material(&self, primitive: u32) -> Option<&Material> {
-        let primitive = self.primitives.get(primitive as usize)?;
-        self.materials.get(primitive.material as usize)
+        Some(self.primitive(primitive)?.1)
     }
 
     /// Whether two neighbouring samples show things that an outline separates.
@@ -266,9 +413,8 @@ impl Frame {
     /// Whether another thing begins to the right of or below each sample of a pixel.
     fn outlines(&self, samples: &[usize; SAMPLES], last_column: bool) -> [bool; SAMPLES] {
         let begins = |sample: usize, other: usize| {
-            self.nearest
-                .get(other)
-                .is_some_and(|&other| self.parted(self.nearest[sample], other))
+            other < self.grid.columns * self.grid.rows
+                && self.parted(self.nearest(sample), self.nearest(other))
         };
         let mut outlines = [false; SAMPLES];
         for (place, &sample) in samples.iter().enumerate() {
@@ -277,6 +423,41 @@ impl Frame {
                 || begins(sample, sample + self.grid.columns);
         }
         outlines
+    }
+}
+
+/// What is opaque at a sample, of one's own or what was drawn before.
+fn opaque(own: Option<&Tiles<Nearest>>, under: Option<&Frame<'_>>, sample: usize) -> Nearest {
+    let known = own.and_then(|own| own.get(sample)).copied();
+    known
+        .or_else(|| Some(under?.nearest(sample)))
+        .unwrap_or(NOTHING)
+}
+
+/// Samples of a tile.
+const TILE: usize = 128;
+
+/// A value of each sample; tiles in which nothing was drawn take no memory.
+struct Tiles<T>(Vec<Option<Box<[T; TILE]>>>);
+
+impl<T> Tiles<T> {
+    fn new(grid: Grid) -> Self {
+        let tiles = (grid.columns * grid.rows).div_ceil(TILE);
+        Self((0..tiles).map(|_| None).collect())
+    }
+
+    /// The value at a sample, if anything was drawn near it.
+    fn get(&self, sample: usize) -> Option<&T> {
+        let tile = self.0.get(sample / TILE)?.as_ref()?;
+        Some(&tile[sample % TILE])
+    }
+
+    /// The value at a sample; `before` has those of samples that were not drawn at.
+    fn at(&mut self, sample: usize, before: impl Fn(usize) -> T) -> &mut T {
+        let start = sample - sample % TILE;
+        let tile = self.0[sample / TILE]
+            .get_or_insert_with(|| Box::new(std::array::from_fn(|at| before(start + at))));
+        &mut tile[sample % TILE]
     }
 }
 
@@ -299,7 +480,7 @@ struct Pixel {
 
 /// A pixel being looked at.
 struct Looked<'a> {
-    frame: &'a Frame,
+    frame: &'a Frame<'a>,
     view: &'a View,
     lamps: &'a Lamps,
     /// Background.
@@ -313,7 +494,7 @@ impl Looked<'_> {
         let Nearest {
             nearness,
             primitive,
-        } = self.frame.nearest[sample];
+        } = self.frame.nearest(sample);
         let mut light = self.behind;
         if primitive != NONE {
             light = self.lit(primitive, nearness, at_px, pixel).0;
@@ -324,14 +505,10 @@ impl Looked<'_> {
         if outline {
             light *= OUTLINE;
         }
-        if let Some(&first) = self.frame.first.get(sample) {
+        if !self.frame.is_opaque() {
             let mut stack = std::mem::take(&mut pixel.stack);
             stack.clear();
-            let mut next = first;
-            while let Some(fragment) = self.frame.fragments.get(next as usize) {
-                stack.push(*fragment);
-                next = fragment.next;
-            }
+            stack.extend(self.frame.fragments(sample));
             stack.sort_unstable_by(|a, b| {
                 a.nearness
                     .total_cmp(&b.nearness)
@@ -359,8 +536,7 @@ impl Looked<'_> {
         }
         let (start, direction) = self.view.ray(at_px[0], at_px[1]);
         let point_m = start + direction * self.view.depth_m(f64::from(nearness));
-        let thing = &self.frame.primitives[primitive as usize];
-        let material = &self.frame.materials[thing.material as usize];
+        let (thing, material) = self.frame.primitive(primitive).expect("it was drawn");
         let normal = thing.normal(&point_m.cast());
         let (light, opacity) = self.lamps.shade(material, normal, -direction.cast::<f32>());
         pixel.lit.push((primitive, light, opacity));

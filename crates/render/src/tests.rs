@@ -8,8 +8,8 @@ use needlebench_geometry::{Shape, TriangleMesh};
 use needlebench_kinematics::Pose;
 
 use crate::{
-    Anchor, Camera, Floor, Image, Label, Line3, PictureError, Projection, Scene, SurfaceInstance,
-    render, tile,
+    Anchor, Camera, Floor, Image, Label, Line3, PictureError, Projection, Scene, Stage,
+    SurfaceInstance, render, tile,
 };
 
 const RED: [f32; 4] = [0.8, 0.1, 0.1, 1.0];
@@ -504,6 +504,26 @@ fn the_bench_renders_to_the_same_png_twice() {
         pixels.chunks_exact(3).nth(225 * 600 + 300),
         Some(&center(&image)[..])
     );
+}
+
+#[test]
+fn a_picture_on_a_stage_is_that_of_all_together() {
+    let camera = bench_camera([300, 225]);
+    let whole = render(&bench(), &camera);
+    let mut seen = 0;
+    for standing in [0, 1, 4, 9, bench().surfaces.len()] {
+        let mut things = bench();
+        let stage = Scene {
+            surfaces: things.surfaces.drain(..standing).collect(),
+            floor: things.floor.take(),
+            ..Scene::default()
+        };
+        let stage = Stage::new(&stage, &camera);
+        assert!(stage.picture(&things) == whole, "{standing} surfaces stand");
+        // What was drawn on it does not stay.
+        seen += usize::from(stage.picture(&Scene::default()) != whole);
+    }
+    assert_eq!(seen, 5);
 }
 
 #[test]

@@ -104,6 +104,19 @@ impl<'c> Obstacles<'c> {
 }
 
 impl Placed<'_> {
+    /// Whether a line from a point of one ball to a point of another may meet the solid.
+    fn may_be_between(&self, from: &Ball, to: &Ball) -> bool {
+        /// Of points in metres.
+        const ROUNDING_M: f64 = 1e-9;
+        let along = to.center_m - from.center_m;
+        let to_center = self.ball_center_m - from.center_m;
+        let length_squared = along.norm_squared().max(f64::MIN_POSITIVE);
+        let nearest = (to_center.dot(&along) / length_squared).clamp(0.0, 1.0);
+        // A line is nowhere farther from that of the centres than the larger ball reaches.
+        let reach_m = self.solid.ball_radius_m + from.radius_m.max(to.radius_m) + ROUNDING_M;
+        (to_center - along * nearest).norm_squared() <= reach_m * reach_m
+    }
+
     /// Parameter, 0 at `from` and 1 at `to`, of the first point of a segment in the solid.
     fn hit(&self, from: &Point3<f64>, to: &Point3<f64>, likely: &mut usize) -> Option<f64> {
         let along = to - from;
@@ -129,10 +142,22 @@ pub struct PlacedObstacles<'o> {
 
 /// Lines of sight past solids; one line is quicker for those before it, and finds the same.
 #[derive(Debug)]
-pub struct SightLines<'p> {
-    obstacles: &'p PlacedObstacles<'p>,
-    /// By solid: what let the last line pass.
-    likely: Vec<usize>,
+pub struct SightLines<'p>(Vec<InSight<'p>>);
+
+/// A solid that lines may meet.
+#[derive(Debug)]
+struct InSight<'p> {
+    index: usize,
+    placed: &'p Placed<'p>,
+    /// What let the last line pass.
+    likely: usize,
+}
+
+/// All points within a distance of one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ball {
+    pub center_m: Point3<f64>,
+    pub radius_m: f64,
 }
 
 impl SightLines<'_> {
@@ -144,13 +169,12 @@ impl SightLines<'_> {
         to: &Point3<f64>,
     ) -> Option<(f64, usize)> {
         let mut first: Option<(f64, usize)> = None;
-        let solids = self.obstacles.solids.iter().zip(&mut self.likely);
-        for (index, (placed, likely)) in solids.enumerate() {
-            let hit = placed.hit(from, to, likely);
+        for solid in &mut self.0 {
+            let hit = solid.placed.hit(from, to, &mut solid.likely);
             if let Some(t) = hit
                 && first.is_none_or(|(known, _)| t < known)
             {
-                first = Some((t, index));
+                first = Some((t, solid.index));
             }
         }
         first
@@ -158,8 +182,8 @@ impl SightLines<'_> {
 
     /// Whether anything is between two points.
     pub(crate) fn is_in_the_way(&mut self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
-        let mut solids = self.obstacles.solids.iter().zip(&mut self.likely);
-        solids.any(|(placed, likely)| placed.hit(from, to, likely).is_some())
+        let mut solids = self.0.iter_mut();
+        solids.any(|solid| solid.placed.hit(from, to, &mut solid.likely).is_some())
     }
 }
 
@@ -241,10 +265,26 @@ impl PlacedObstacles<'_> {
 
     /// Lines of sight past the solids.
     pub fn lines(&self) -> SightLines<'_> {
-        SightLines {
-            obstacles: self,
-            likely: vec![usize::MAX; self.solids.len()],
-        }
+        self.lines_past(|_| true)
+    }
+
+    /// Lines of sight from points of one ball to points of another: the same, without the solids that none can meet.
+    pub(super) fn lines_between(&self, from: &Ball, to: &Ball) -> SightLines<'_> {
+        self.lines_past(|placed| placed.may_be_between(from, to))
+    }
+
+    fn lines_past(&self, counts: impl Fn(&Placed<'_>) -> bool) -> SightLines<'_> {
+        let all = self.solids.iter().enumerate();
+        let counted = all.filter(|(_, placed)| counts(placed));
+        SightLines(
+            counted
+                .map(|(index, placed)| InSight {
+                    index,
+                    placed,
+                    likely: usize::MAX,
+                })
+                .collect(),
+        )
     }
 
     /// Voxels whose centre is nearer to a solid than the margin, in the grid's order.

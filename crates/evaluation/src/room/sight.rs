@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Vector3};
 
 use super::hand_cone::frame_about;
-use super::obstacles::PlacedObstacles;
+use super::obstacles::{Ball, PlacedObstacles, SightLines};
 
 /// Segments of one series, to the skin about the entry point and as many to the needle.
 pub(crate) const SIGHT_SEGMENTS: u32 = 512;
@@ -35,6 +35,34 @@ impl SightTargets {
     pub(super) fn is_within(&self, other: &Self, distance_m: f64) -> bool {
         let mut ends = self.needle_m.iter().zip(&other.needle_m);
         ends.all(|(a, b)| (a - b).norm() <= distance_m)
+    }
+
+    /// Middle of the piece of skin that is looked at.
+    fn skin_m(&self) -> Point3<f64> {
+        self.entry_m + self.outwards * ENTRY_DISC_HEIGHT_M
+    }
+
+    /// Lines from eyes in a ball past solids: to the skin, and to the needle.
+    fn lines<'p>(
+        &self,
+        solids: &'p PlacedObstacles<'_>,
+        eyes_m: &Point3<f64>,
+        head_movement_m: f64,
+    ) -> [SightLines<'p>; 2] {
+        let [near, hub] = &self.needle_m;
+        let eyes = Ball {
+            center_m: *eyes_m,
+            radius_m: head_movement_m,
+        };
+        let skin = Ball {
+            center_m: self.skin_m(),
+            radius_m: ENTRY_DISC_RADIUS_M,
+        };
+        let needle = Ball {
+            center_m: nalgebra::center(near, hub),
+            radius_m: 0.5 * (near - hub).norm(),
+        };
+        [skin, needle].map(|target| solids.lines_between(&eyes, &target))
     }
 }
 
@@ -114,8 +142,7 @@ fn series(
         let eye = eyes_m + Vector3::new(level * cosine, level * sine, up) * radius_m;
         let target = if index % 2 == 0 {
             let (sine, cosine) = libm::sincos(TAU * about);
-            targets.entry_m
-                + targets.outwards * ENTRY_DISC_HEIGHT_M
+            targets.skin_m()
                 + (across * cosine + beside * sine) * (ENTRY_DISC_RADIUS_M * out.sqrt())
         } else {
             targets.needle_m[0] + (targets.needle_m[1] - targets.needle_m[0]) * out
@@ -145,10 +172,11 @@ impl OpenLines {
         head_movement_m: f64,
         targets: &SightTargets,
     ) -> Self {
-        let mut past = surroundings.lines();
+        let mut past = targets.lines(surroundings, eyes_m, head_movement_m);
         let is_open = starts()
             .flat_map(|start| series(eyes_m, head_movement_m, targets, SIGHT_SEGMENTS, start))
-            .map(|[eye, target]| !past.is_in_the_way(&eye, &target))
+            .enumerate()
+            .map(|(index, [eye, target])| !past[index % 2].is_in_the_way(&eye, &target))
             .collect();
         Self {
             eyes_m: *eyes_m,
@@ -170,7 +198,9 @@ impl OpenLines {
         let mut blocked: Vec<(usize, u32)> = Vec::new();
         let mut all: Counts = [[0; 2]; 2];
         let mut means = Vec::new();
-        let mut past_robot = robot.lines();
+        let mut past_robot = self
+            .targets
+            .lines(robot, &self.eyes_m, self.head_movement_m);
         let of_series = self.is_open.chunks(2 * SIGHT_SEGMENTS as usize);
         for (start, is_open) in starts().zip(of_series) {
             let mut counts: Counts = [[0; 2]; 2];
@@ -187,7 +217,7 @@ impl OpenLines {
                 }
                 let [open, free] = &mut counts[index % 2];
                 *open += 1;
-                match past_robot.first_on_the_way(&eye, &target) {
+                match past_robot[index % 2].first_on_the_way(&eye, &target) {
                     None => *free += 1,
                     Some((_, solid)) => {
                         match blocked.iter_mut().find(|(known, _)| *known == solid) {

@@ -1,6 +1,6 @@
 //! Pictures and charts of a run's goals.
 
-use needlebench_evaluation::report::Report;
+use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report};
 use needlebench_evaluation::room::RoomModel;
 use needlebench_parallel::in_parallel;
 use needlebench_render::{Image, tile};
@@ -10,9 +10,7 @@ use super::error::FilesError;
 use super::folder::Folder;
 use crate::chart::budget::budget_chart;
 use crate::chart::ranking::ranking_chart;
-use crate::picture::configuration::{
-    Backdrop, Shown, configuration_picture, goal_camera, sheet_caption,
-};
+use crate::picture::configuration::{Backdrop, Shown, configuration_picture, sheet_caption};
 use crate::picture::room::{RoomPictures, room_caption};
 
 /// What is added to the names of pictures: those of the posture, those of the free space.
@@ -62,31 +60,9 @@ impl<'a> Pictures<'a> {
     ) -> Result<(), FilesError> {
         let goal = &self.resolved.goals[index].name;
         let report = &run.goals[index];
-        let mut sheets = [Vec::new(), Vec::new()];
-        for (at, pictures) in self.draw(index, run).into_iter().enumerate() {
-            let configuration = &report.configurations[at];
-            let captions = [
-                sheet_caption(report, configuration),
-                room_caption(report, configuration),
-            ];
-            let kinds = KINDS.iter().zip(&mut sheets).zip(captions);
-            for (picture, ((kind, sheet), caption)) in pictures.into_iter().zip(kinds) {
-                let Some(image) = picture else { continue };
-                let name = format!("{goal}/{}{kind}.png", configuration.label);
-                self.folder.write_image(&name, &image)?;
-                names[at].push(name);
-                sheet.push((image, caption));
-            }
-        }
-        for (kind, sheet) in KINDS.iter().zip(&sheets) {
-            let name = format!("{goal}{kind}.png");
-            if sheet.is_empty() {
-                self.folder.remove(&name)?;
-            } else {
-                self.folder
-                    .write_image(&name, &tile(sheet, SHEET_COLUMNS))?;
-            }
-        }
+        let [posture, space] = KINDS;
+        self.write_postures(posture, index, run, names)?;
+        self.write_space(space, index, run, names)?;
         for (kind, chart) in CHARTS
             .iter()
             .zip([ranking_chart(report), budget_chart(report)])
@@ -102,31 +78,66 @@ impl<'a> Pictures<'a> {
         Ok(())
     }
 
-    /// Pictures of all configurations of a goal, on all threads.
-    fn draw(&self, index: usize, run: &Report) -> Vec<[Option<Image>; 2]> {
-        let goal = &self.resolved.goals[index];
-        let camera = goal_camera(self.resolved, goal);
+    fn write_postures(
+        &self,
+        kind: &str,
+        index: usize,
+        run: &Report,
+        names: &mut [Vec<String>],
+    ) -> Result<(), FilesError> {
+        let stage = self
+            .backdrop
+            .stage(self.resolved, &self.resolved.goals[index]);
+        let draw = |shown: &Shown<'_>| configuration_picture(self.resolved, &stage, shown);
+        self.write_kind(kind, index, run, names, &draw, sheet_caption)
+    }
+
+    fn write_space(
+        &self,
+        kind: &str,
+        index: usize,
+        run: &Report,
+        names: &mut [Vec<String>],
+    ) -> Result<(), FilesError> {
         let room = RoomPictures::new(self.resolved, &self.backdrop, &self.room, index);
-        let all = run.goals[index].configurations.iter();
-        let all: Vec<_> = all.flat_map(|each| [(each, false), (each, true)]).collect();
-        let drawn = in_parallel(self.jobs, &all, |(configuration, is_room)| {
-            let shown = Shown {
+        let draw = |shown: &Shown<'_>| room.draw(shown);
+        self.write_kind(kind, index, run, names, &draw, room_caption)
+    }
+
+    /// Draws all configurations of a goal, on all threads, and a sheet of them.
+    fn write_kind(
+        &self,
+        kind: &str,
+        index: usize,
+        run: &Report,
+        names: &mut [Vec<String>],
+        draw: &(impl Fn(&Shown<'_>) -> Option<Image> + Sync),
+        caption: fn(&GoalReport, &ConfigurationReport) -> String,
+    ) -> Result<(), FilesError> {
+        let goal = &self.resolved.goals[index];
+        let report = &run.goals[index];
+        let drawn = in_parallel(self.jobs, &report.configurations, |configuration| {
+            let image = draw(&Shown {
                 run,
                 goal,
                 configuration,
-            };
-            if *is_room {
-                room.draw(&shown)
-            } else {
-                configuration_picture(self.resolved, &self.backdrop, &camera, &shown)
-            }
+            })?;
+            Some(image.to_png().map(|png| (image, png)))
         });
-        let mut drawn = drawn.into_iter();
-        let mut next = || drawn.next().flatten();
-        run.goals[index]
-            .configurations
-            .iter()
-            .map(|_| [next(), next()])
-            .collect()
+        let mut sheet = Vec::new();
+        for ((configuration, names), drawn) in report.configurations.iter().zip(names).zip(drawn) {
+            let Some(drawn) = drawn else { continue };
+            let (image, png) = drawn?;
+            let name = format!("{}/{}{kind}.png", goal.name, configuration.label);
+            self.folder.write(&name, png)?;
+            names.push(name);
+            sheet.push((image, caption(report, configuration)));
+        }
+        let name = format!("{}{kind}.png", goal.name);
+        if sheet.is_empty() {
+            self.folder.remove(&name)
+        } else {
+            self.folder.write_image(&name, &tile(&sheet, SHEET_COLUMNS))
+        }
     }
 }

@@ -9,7 +9,7 @@ use needlebench_geometry::Visual;
 use needlebench_kinematics::{Joints, Pose};
 use needlebench_phantom::Tissue;
 use needlebench_render::{
-    Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceInstance, render,
+    Anchor, Camera, Floor, Image, Label, Line3, Scene, Stage, SurfaceInstance, render,
 };
 use needlebench_scenario::{Goal, ResolvedScenario};
 use needlebench_show::number::{millimetres, small_length};
@@ -68,6 +68,20 @@ impl Backdrop {
         }
         Self { surfaces }
     }
+
+    /// All of it, on the floor under a goal.
+    pub(super) fn scene(&self, resolved: &ResolvedScenario, goal: &Goal) -> Scene {
+        Scene {
+            surfaces: self.surfaces.clone(),
+            floor: Some(floor(resolved, goal)),
+            ..Scene::default()
+        }
+    }
+
+    /// What all pictures of a goal's postures have in common.
+    pub(crate) fn stage(&self, resolved: &ResolvedScenario, goal: &Goal) -> Stage {
+        Stage::new(&self.scene(resolved, goal), &goal_camera(resolved, goal))
+    }
 }
 
 fn add(surfaces: &mut Vec<SurfaceInstance>, visuals: &[Visual], world_from_parent: &Pose) {
@@ -90,11 +104,10 @@ pub(crate) struct Shown<'a> {
     pub configuration: &'a ConfigurationReport,
 }
 
-/// Draws one configuration in its final posture; `None` if it has none.
+/// Draws one configuration in its final posture on the stage of its goal; `None` if it has none.
 pub(crate) fn configuration_picture(
     resolved: &ResolvedScenario,
-    backdrop: &Backdrop,
-    camera: &Camera,
+    stage: &Stage,
     shown: &Shown<'_>,
 ) -> Option<Image> {
     let Shown {
@@ -103,7 +116,7 @@ pub(crate) fn configuration_picture(
         ..
     } = shown;
     let q = Joints::from_column_slice(&report.joints_rad?);
-    let mut scene = posture_scene(resolved, backdrop, &q);
+    let mut scene = arm_scene(resolved, &q);
 
     let mut rejections = report.rejections.iter();
     let refused = rejections.find(|each| each.rule == Rule::NeedleRoute.name());
@@ -140,8 +153,7 @@ pub(crate) fn configuration_picture(
             anchor: Anchor::BottomLeft,
         });
     }
-    scene.floor = Some(floor(resolved, goal));
-    Some(render(&scene, camera))
+    Some(stage.picture(&scene))
 }
 
 /// Draws the cell of a scenario with the arm in a posture at its first goal.
@@ -160,11 +172,17 @@ pub(crate) fn placement_picture(resolved: &ResolvedScenario, q: &Joints) -> Imag
 
 /// The cell with the arm in a posture.
 pub fn posture_scene(resolved: &ResolvedScenario, backdrop: &Backdrop, q: &Joints) -> Scene {
+    let mut scene = arm_scene(resolved, q);
+    scene
+        .surfaces
+        .splice(..0, backdrop.surfaces.iter().cloned());
+    scene
+}
+
+/// Arm and tool in a posture.
+pub(super) fn arm_scene(resolved: &ResolvedScenario, q: &Joints) -> Scene {
     let robot = &resolved.cell.robot;
-    let mut scene = Scene {
-        surfaces: backdrop.surfaces.clone(),
-        ..Scene::default()
-    };
+    let mut scene = Scene::default();
     for (link, pose) in robot.links.iter().zip(robot.world_from_links(q)) {
         add(&mut scene.surfaces, &link.visuals, &pose);
     }

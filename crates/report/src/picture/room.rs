@@ -7,16 +7,16 @@ use std::sync::Arc;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use needlebench_cell::part_in_words;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
-use needlebench_evaluation::room::{RoomModel, RoomReport, SECTOR_RADIUS_M, sight_segments};
+use needlebench_evaluation::room::{
+    RoomModel, RoomReport, SECTOR_RADIUS_M, Sector, sight_segments,
+};
 use needlebench_geometry::{Shape, TriangleMesh};
 use needlebench_kinematics::{Joints, Pose};
-use needlebench_render::{Anchor, Camera, Image, Label, Line3, Scene, SurfaceInstance, render};
+use needlebench_render::{Anchor, Camera, Image, Label, Line3, Scene, Stage, SurfaceInstance};
 use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::people::Person;
 
-use super::configuration::{
-    Backdrop, Shown, floor, posture_scene, sheet_caption, status_in_words, viewpoint,
-};
+use super::configuration::{Backdrop, Shown, arm_scene, sheet_caption, status_in_words, viewpoint};
 use super::voxels::voxel_surface;
 
 /// Size of one picture, pixels.
@@ -42,26 +42,30 @@ const CHORD_ERROR_M: f64 = 2e-3;
 /// What all pictures of a goal have in common.
 pub struct RoomPictures<'a> {
     resolved: &'a ResolvedScenario,
-    backdrop: &'a Backdrop,
     room: &'a RoomModel<'a>,
     goal: usize,
-    camera: Camera,
+    stage: Stage,
 }
 
 impl<'a> RoomPictures<'a> {
     /// Of one goal of a scenario.
     pub fn new(
         resolved: &'a ResolvedScenario,
-        backdrop: &'a Backdrop,
+        backdrop: &Backdrop,
         room: &'a RoomModel<'a>,
         goal: usize,
     ) -> Self {
+        let mut scene = backdrop.scene(resolved, &resolved.goals[goal]);
+        for person in &resolved.people.by_goal[goal] {
+            let heads = person.statures_m.iter().map(|m| person.eyes_m(*m));
+            scene.surfaces.extend(heads.map(|at| ball(at, 0.045, HEAD)));
+            scene.surfaces.push(body(person));
+        }
         Self {
             resolved,
-            backdrop,
             room,
             goal,
-            camera: camera(resolved, room, goal),
+            stage: Stage::new(&scene, &camera(resolved, room, goal)),
         }
     }
 
@@ -74,7 +78,7 @@ impl<'a> RoomPictures<'a> {
         let report = shown.configuration;
         let q = Joints::from_column_slice(&report.joints_rad?);
         let room = report.room.as_ref()?;
-        let mut scene = posture_scene(self.resolved, self.backdrop, &q);
+        let mut scene = arm_scene(self.resolved, &q);
         self.add_space(&mut scene, &q);
         self.add_sight(&mut scene, &q, room);
         let entry = self.room.guide_entry(&q);
@@ -104,12 +108,11 @@ impl<'a> RoomPictures<'a> {
                 .to_owned(),
             anchor: Anchor::BottomRight,
         });
-        let goal = &self.resolved.goals[self.goal];
-        scene.floor = Some(floor(self.resolved, goal));
-        Some(render(&scene, &self.camera))
+        Some(self.stage.picture(&scene))
     }
 
-    /// The hemisphere about the entry point, and what the arm occupies of it.
+    /// The hemisphere about the entry point, and what the arm occupies of it; not on the stage, since both meet in the
+    /// entry point, where the one that is drawn first is behind the other.
     fn add_space(&self, scene: &mut Scene, q: &Joints) {
         let sector = self.room.sector(self.goal);
         let taken = self.room.taken(self.goal, q);
@@ -118,16 +121,10 @@ impl<'a> RoomPictures<'a> {
             world_from_surface: Pose::identity(),
             color_rgba: TAKEN,
         });
-        let outwards = UnitQuaternion::rotation_between(&-Vector3::z(), &sector.outwards)
-            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
-        scene.surfaces.push(SurfaceInstance {
-            mesh: Arc::new(cone(FRAC_PI_2, sector.radius_m)),
-            world_from_surface: Pose::from_parts(sector.center_m.coords.into(), outwards),
-            color_rgba: FREE,
-        });
+        scene.surfaces.push(hemisphere(sector));
     }
 
-    /// People with their lines of sight; one label for each stature.
+    /// People's lines of sight; one label for each stature.
     fn add_sight(&self, scene: &mut Scene, q: &Joints, room: &RoomReport) {
         let all = self.room.obstacles().all(q);
         let mut sight = all.lines();
@@ -149,7 +146,6 @@ impl<'a> RoomPictures<'a> {
                         width_px: 1.4,
                     });
                 }
-                scene.surfaces.push(ball(eyes_m, 0.045, HEAD));
                 let seen = room
                     .sight
                     .iter()
@@ -165,8 +161,18 @@ impl<'a> RoomPictures<'a> {
                     });
                 }
             }
-            scene.surfaces.push(body(person));
         }
+    }
+}
+
+/// The hemisphere about an entry point.
+fn hemisphere(sector: &Sector) -> SurfaceInstance {
+    let outwards = UnitQuaternion::rotation_between(&-Vector3::z(), &sector.outwards)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
+    SurfaceInstance {
+        mesh: Arc::new(cone(FRAC_PI_2, sector.radius_m)),
+        world_from_surface: Pose::from_parts(sector.center_m.coords.into(), outwards),
+        color_rgba: FREE,
     }
 }
 
