@@ -137,7 +137,8 @@ impl Polytope {
     /// A tetrahedron of support points. It need not contain the origin: faces that the origin is
     /// in front of are expanded first.
     ///
-    /// Each support point is an overlap too: where one is below the cutoff's, nothing needs to grow.
+    /// Each support point is an overlap too: where one is below the cutoff's, nothing needs to grow. By as much as a depth
+    /// may be overestimated, so that what is told of any cutoff is the same.
     pub fn around(
         difference: &mut Difference<'_>,
         axes: &Matrix3<f64>,
@@ -148,7 +149,7 @@ impl Polytope {
                 let vertex = difference.support(&along);
                 (vertex, -along.dot(&vertex.x))
             });
-            if ahead.1.max(behind.1) > cutoff_m {
+            if ahead.1.max(behind.1) > cutoff_m + RELAXED_GAP_M {
                 Err(NoPolytope::BeyondCutoff)
             } else {
                 Ok([ahead.0, behind.0])
