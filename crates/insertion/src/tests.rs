@@ -384,3 +384,125 @@ proptest! {
         prop_assert!((a - b).abs() < 1e-3 * a.abs(), "{} {}", a, b);
     }
 }
+
+/// Rigid links with springs in their hinges, at finite angles, in balance at each step: another model of the same needle.
+fn by_links(
+    needle: &Needle,
+    stand_off_m: f64,
+    layers: &Layers,
+    force_n: impl Fn(f64) -> f64,
+    link_m: f64,
+) -> [f64; 2] {
+    let ei = needle.bending_stiffness_nm2();
+    let stiffness = |depth_m: f64| {
+        let at = layers.ends_m().iter().position(|&end_m| depth_m < end_m);
+        at.map_or(0.0, |at| layers.all()[at].stiffness_n_m2)
+    };
+    let total_m = stand_off_m + layers.depth_m();
+    let count = (total_m / link_m).round() as usize;
+    // What was cut: places of the tip, x ascending.
+    let mut cut: Vec<[f64; 2]> = vec![[stand_off_m, 0.0]];
+    let path = |cut: &[[f64; 2]], x: f64| {
+        let at = cut
+            .partition_point(|place| place[0] <= x)
+            .clamp(1, cut.len() - 1);
+        let ([x0, y0], [x1, y1]) = (cut[at - 1], cut[at]);
+        let slope = (y1 - y0) / (x1 - x0);
+        (y0 + slope * (x - x0), slope)
+    };
+    let mut angles: Vec<f64> = Vec::new();
+    let mut end = [0.0; 2];
+    for number in 1..=count {
+        angles.push(angles.last().copied().unwrap_or(0.0));
+        let advance_m = number as f64 * link_m - stand_off_m;
+        if advance_m <= 1e-9 {
+            continue;
+        }
+        let force = force_n(advance_m);
+        for round in 0..40 {
+            let (mut x, mut y) = (vec![0.0], vec![0.0]);
+            for angle in &angles {
+                x.push(x[x.len() - 1] + link_m * angle.cos());
+                y.push(y[y.len() - 1] + link_m * angle.sin());
+            }
+            let mut gradient = DVector::<f64>::zeros(number);
+            let mut hessian = DMatrix::<f64>::zeros(number, number);
+            for j in 0..number {
+                let before = if j == 0 { 0.0 } else { angles[j - 1] };
+                // The clamp is at the exit: half a link of beam is before the first hinge.
+                let spring = if j == 0 {
+                    2.0 * ei / link_m
+                } else {
+                    ei / link_m
+                };
+                let moment = spring * (angles[j] - before);
+                gradient[j] += moment;
+                hessian[(j, j)] += spring;
+                if j > 0 {
+                    gradient[j - 1] -= moment;
+                    hessian[(j - 1, j - 1)] += spring;
+                    hessian[(j, j - 1)] -= spring;
+                    hessian[(j - 1, j)] -= spring;
+                }
+                gradient[j] -= force * link_m * angles[j].cos();
+            }
+            for node in 1..number {
+                let depth_m = x[node] - stand_off_m;
+                if depth_m < -0.5 * link_m || cut.len() < 2 {
+                    continue;
+                }
+                let half = |from_m: f64| stiffness(from_m.max(0.0)) * 0.5 * link_m;
+                let weight = half(depth_m + 0.25 * link_m)
+                    + if depth_m > 0.5 * link_m {
+                        half(depth_m - 0.25 * link_m)
+                    } else {
+                        0.0
+                    };
+                let (rest, slope) = path(&cut, x[node]);
+                let off = y[node] - rest;
+                let by = |j: usize| link_m * (angles[j].cos() + slope * angles[j].sin());
+                for i in 0..node {
+                    gradient[i] += weight * off * by(i);
+                    for j in 0..node {
+                        hessian[(i, j)] += weight * by(i) * by(j);
+                    }
+                }
+            }
+            let step = hessian.lu().solve(&gradient).unwrap();
+            for (angle, step) in angles.iter_mut().zip(step.iter()) {
+                *angle -= step;
+            }
+            if step.amax() < 1e-13 && round > 0 {
+                break;
+            }
+        }
+        let (mut x, mut y) = (0.0, 0.0);
+        for angle in &angles {
+            x += link_m * angle.cos();
+            y += link_m * angle.sin();
+        }
+        end = [x, y];
+        cut.push(end);
+    }
+    end
+}
+
+#[test]
+fn links_with_finite_angles_bend_as_much() {
+    let chest = [
+        [0.01, 5e3, 0.06],
+        [0.02, 2e4, 0.1],
+        [0.05, 2e3, 0.025],
+        [0.01, 2e4, 0.1],
+    ];
+    for (number, share, link_m) in [(18, 1.0, 5e-4), (20, 0.5, 1e-3)] {
+        let all = chest.map(|[length_m, k, f]| [length_m, k, share * f]);
+        let tissue = layers(&all);
+        let (needle, holder, good) = (gauge(number), Holder::Clamp, bevel(EAST));
+        let case = Case::new(&needle, &holder, 0.01, &tissue, &good, 0.6e-3).unwrap();
+        let ours = case.shape(case.cut(), None).tip_m()[0];
+        let force_n = |depth_m: f64| case.force_n(depth_m)[0];
+        let [_, theirs] = by_links(&needle, 0.01, &tissue, force_n, link_m);
+        close(ours, theirs, 1e-3);
+    }
+}
