@@ -18,8 +18,13 @@ mod layers;
 mod needle;
 #[cfg(test)]
 mod tests;
+mod tissue;
 
 pub use guide::{Guide, Holder};
 pub use insertion::{Bevel, Insertion, InsertionError, Slip, WARNED_SLOPE, insert};
 pub use layers::{Layer, Layers, LayersError};
 pub use needle::{Gauge, Needle, NeedleError, STEEL_PA};
+pub use tissue::{
+    DIAMETER_POWER, Factor, MODEL, Point, REFERENCE_DIAMETER_M, STIFFNESS_POWER, Tissue,
+    WALL_FORCE_N,
+};

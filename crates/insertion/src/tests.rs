@@ -506,3 +506,30 @@ fn links_with_finite_angles_bend_as_much() {
         close(ours, theirs, 1e-3);
     }
 }
+
+/// Chest of the shipped phantoms, guide at 10 mm: 18 G, 20 G, 22 G at 60, 90, 120 mm, with medians.
+#[test]
+fn bends_in_a_chest_grow_with_depth_and_gauge() {
+    let mut before = [0.0; 3];
+    for number in [18, 20, 22] {
+        let needle = gauge(number);
+        let bends = [0.06, 0.09, 0.12].map(|depth_m| {
+            let all = [
+                (Tissue::Fat, 0.01),
+                (Tissue::Wall, 0.02),
+                (Tissue::Lung, depth_m - 0.04),
+                (Tissue::Lesion, 0.01),
+            ];
+            let all = all.map(|(tissue, length_m)| tissue.layer(length_m, needle.outer_m));
+            let tissue = Layers::new(all.to_vec()).unwrap();
+            let holder = Holder::Guide(Guide {
+                length_m: 0.05,
+                play_m: 0.5 * (1.4e-3 - needle.outer_m),
+            });
+            tip(&needle, &holder, 0.01, &tissue)
+        });
+        assert!(bends.windows(2).all(|pair| pair[1] > pair[0]));
+        assert!(bends.iter().zip(&before).all(|(now, before)| now > before));
+        before = bends;
+    }
+}
