@@ -95,6 +95,19 @@ impl Layers {
         Ok(Self { all, ends_m })
     }
 
+    /// Of layers whose lengths were checked.
+    pub(crate) fn from_checked(all: Vec<Layer>) -> Self {
+        let mut end_m = 0.0;
+        let ends_m = all.iter().map(|layer| {
+            end_m += layer.length_m;
+            end_m
+        });
+        Self {
+            ends_m: ends_m.collect(),
+            all,
+        }
+    }
+
     /// In their order.
     pub fn all(&self) -> &[Layer] {
         &self.all

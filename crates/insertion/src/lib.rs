@@ -12,6 +12,7 @@
 
 mod element;
 mod elimination;
+mod fit;
 mod guide;
 mod insertion;
 mod layers;
@@ -20,6 +21,7 @@ mod needle;
 mod tests;
 mod tissue;
 
+pub use fit::{Bend, FitError, FittedForce, fit_force};
 pub use guide::{Guide, Holder};
 pub use insertion::{Bevel, Insertion, InsertionError, Slip, WARNED_SLOPE, insert};
 pub use layers::{Layer, Layers, LayersError};

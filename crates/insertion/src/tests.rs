@@ -533,3 +533,49 @@ fn bends_in_a_chest_grow_with_depth_and_gauge() {
         before = bends;
     }
 }
+
+#[test]
+fn fitted_forces_hold_within_their_interval() {
+    let (needle, holder, good) = (gauge(20), guide(1e-4), bevel([0.0, 1.0]));
+    let tissue = layers(&[[0.01, 5e3, 0.04], [0.09, 2e4, 0.07]]);
+    let wanted = 1.37;
+    let stronger = layers(&[[0.01, 5e3, 0.04 * wanted], [0.09, 2e4, 0.07 * wanted]]);
+    let truth = insert(&needle, &holder, 0.01, &stronger, &good).unwrap();
+    let depths: Vec<usize> = (1..=8).map(|at| truth.depths_m.len() * at / 9).collect();
+    let mut random = needlebench_numerics::random::SplitMix64::new(7);
+    let mut within = 0;
+    for _ in 0..200 {
+        let bends: Vec<Bend> = depths
+            .iter()
+            .map(|&at| Bend {
+                depth_m: truth.depths_m[at],
+                bend_m: truth.path_m[at][1] + 0.3e-3 * random.standard_normal(),
+            })
+            .collect();
+        let found = fit_force(&needle, &holder, 0.01, &tissue, &good, &bends).unwrap();
+        assert!((found.factor - wanted).abs() < 0.5, "{found:?}");
+        within += usize::from((found.interval[0]..=found.interval[1]).contains(&wanted));
+    }
+    // 190 are expected, 183 to 196 with 97 %.
+    assert!((183..=197).contains(&within), "{within}");
+    // Without noise it is found.
+    let bends: Vec<Bend> = depths
+        .iter()
+        .map(|&at| Bend {
+            depth_m: truth.depths_m[at],
+            bend_m: truth.path_m[at][1],
+        })
+        .collect();
+    let found = fit_force(&needle, &holder, 0.01, &tissue, &good, &bends).unwrap();
+    close(found.factor, wanted, 1e-3);
+    assert!(matches!(
+        fit_force(&needle, &holder, 0.01, &tissue, &good, &bends[..4]),
+        Err(FitError::Few(4))
+    ));
+    let mut again = bends.clone();
+    again.swap(2, 3);
+    assert!(matches!(
+        fit_force(&needle, &holder, 0.01, &tissue, &good, &again),
+        Err(FitError::Depth { number: 4, .. })
+    ));
+}
