@@ -11,21 +11,23 @@ use serde_json::Value;
 /// Every crate under `crates/`, the Python package, and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 36] = [
+const LAYERS: [(&str, &[&str]); 37] = [
     ("elementary", &[]),
     ("parallel", &[]),
     ("numerics", &[]),
+    ("insertion", &["numerics"]),
     ("kinematics", &["numerics"]),
     ("geometry", &["kinematics"]),
     ("input", &[]),
     ("iso9283", &["input", "kinematics"]),
     ("cell", &["geometry", "kinematics"]),
     ("robot", &["cell", "input", "geometry", "kinematics"]),
-    ("phantom", &["input", "geometry", "kinematics"]),
+    ("phantom", &["insertion", "input", "geometry", "kinematics"]),
     (
         "scenario",
         &[
             "iso9283",
+            "insertion",
             "phantom",
             "robot",
             "cell",
@@ -56,7 +58,14 @@ const LAYERS: [(&str, &[&str]); 36] = [
     ("show", &["render", "input"]),
     (
         "uncertainty",
-        &["engine", "scenario", "cell", "kinematics", "numerics"],
+        &[
+            "engine",
+            "scenario",
+            "cell",
+            "insertion",
+            "kinematics",
+            "numerics",
+        ],
     ),
     ("study", &["scenario", "input", "kinematics", "numerics"]),
     ("ros", &[]),
@@ -235,6 +244,7 @@ const LAYERS: [(&str, &[&str]); 36] = [
     (
         "needlebench",
         &[
+            "insertion",
             "iso9283",
             "credibility",
             "synthesis",
