@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 
-use crate::shape::Shape;
+use crate::shape::{Shape, Solid};
 use crate::tree::TriangleTree;
 use crate::triangle_mesh::TriangleMesh;
 
@@ -82,34 +82,72 @@ impl SightTarget {
 pub fn first_hit(shape: &Shape, from: &Point3<f64>, to: &Point3<f64>) -> Option<f64> {
     let along = to - from;
     match shape {
-        Shape::Sphere { radius_m } => in_ball(&from.coords, &along, *radius_m).hit(),
+        Shape::Mesh(mesh) => mesh.surface().first_hit(from, &along),
+        convex => in_convex(convex, from, &along).hit(),
+    }
+}
+
+impl Solid {
+    /// The stretches of a segment that are inside, by their parameters: 0 at `from` and 1 at `to`, in their order. Ends are
+    /// in the parent's frame, m.
+    ///
+    /// Exact for every shape; one stretch at most of a convex one.
+    pub fn stretches(&self, from: &Point3<f64>, to: &Point3<f64>) -> Vec<[f64; 2]> {
+        let local = self.parent_from_shape.inverse();
+        let (from, to) = (local * from, local * to);
+        let along = to - from;
+        if let Shape::Mesh(mesh) = &self.shape {
+            let Some(direction) = UnitVector3::try_new(along, 0.0) else {
+                return Vec::new();
+            };
+            let length_m = along.norm();
+            let stretches = mesh.tree().clip_line(&from, &direction).into_iter();
+            let within = stretches.map(|(enters_m, leaves_m)| {
+                [
+                    (enters_m / length_m).max(0.0),
+                    (leaves_m / length_m).min(1.0),
+                ]
+            });
+            return within.filter(|[enters, leaves]| enters < leaves).collect();
+        }
+        let inside = in_convex(&self.shape, &from, &along);
+        let stretch = inside.hit().map(|low| [low, inside.high]);
+        stretch.into_iter().collect()
+    }
+}
+
+/// The part of a segment that is in a shape other than a mesh.
+fn in_convex(shape: &Shape, from: &Point3<f64>, along: &Vector3<f64>) -> Interval {
+    match shape {
+        Shape::Sphere { radius_m } => in_ball(&from.coords, along, *radius_m),
         Shape::Cylinder {
             radius_m,
             half_length_m,
-        } => in_tube(from, &along, *radius_m)
-            .and(slab(from.z, along.z, *half_length_m))
-            .hit(),
+        } => in_tube(from, along, *radius_m).and(slab(from.z, along.z, *half_length_m)),
         Shape::Capsule {
             radius_m,
             half_length_m,
         } => {
-            let tube = in_tube(from, &along, *radius_m).and(slab(from.z, along.z, *half_length_m));
+            let tube = in_tube(from, along, *radius_m).and(slab(from.z, along.z, *half_length_m));
             [half_length_m, &-half_length_m]
                 .map(|z| {
                     let from_end = from.coords - Vector3::new(0.0, 0.0, *z);
-                    in_ball(&from_end, &along, *radius_m)
+                    in_ball(&from_end, along, *radius_m)
                 })
                 .into_iter()
                 .chain([tube])
-                .filter_map(Interval::hit)
-                .reduce(f64::min)
+                .filter(|part| part.low < part.high)
+                .reduce(|a, b| Interval {
+                    low: a.low.min(b.low),
+                    high: a.high.max(b.high),
+                })
+                .unwrap_or(Interval::EMPTY)
         }
         Shape::Cuboid { half_extents_m } => (0..3)
             .map(|axis| slab(from[axis], along[axis], half_extents_m[axis]))
-            .fold(Interval::ALL, Interval::and)
-            .hit(),
-        Shape::Convex(mesh) => in_hull(&mesh.0, from, &along).hit(),
-        Shape::Mesh(mesh) => mesh.surface().first_hit(from, &along),
+            .fold(Interval::ALL, Interval::and),
+        Shape::Convex(mesh) => in_hull(&mesh.0, from, along),
+        Shape::Mesh(_) => unreachable!("a mesh is asked for its triangles"),
     }
 }
 
@@ -318,6 +356,36 @@ mod tests {
             }
         }
         assert!(hits > 100 && passes > 100, "{hits} {passes}");
+    }
+
+    /// Against walks along the segments; corners that a step passes over may be missed by the walk.
+    #[test]
+    fn stretches_of_a_segment_are_its_inner_points() {
+        const STEPS: u32 = 1000;
+        let mut random = SplitMix64::new(8);
+        let mut found = 0;
+        for shape in shapes() {
+            let solid = Solid {
+                name: "solid".into(),
+                shape: shape.clone(),
+                parent_from_shape: needlebench_kinematics::Pose::translation(0.1, -0.2, 0.05),
+            };
+            for _ in 0..100 {
+                let mut point = || Point3::from([(); 3].map(|()| random.uniform(-0.6, 0.6)));
+                let (from, to) = (point(), point());
+                let stretches = solid.stretches(&from, &to);
+                found += stretches.len();
+                for k in 0..=STEPS {
+                    let at = f64::from(k) / f64::from(STEPS);
+                    let local = solid.parent_from_shape.inverse() * (from + (to - from) * at);
+                    let near = |end: &f64| (end - at).abs() < 1e-9;
+                    let is_in = stretches.iter().any(|[a, b]| (*a..=*b).contains(&at));
+                    let is_edge = stretches.iter().flatten().any(near);
+                    assert!(is_edge || is_in == inside(&shape, &local), "{shape:?} {at}");
+                }
+            }
+        }
+        assert!(found > 100, "{found}");
     }
 
     #[test]
