@@ -119,6 +119,22 @@ pub fn insert(
     Ok(case.shape(path, None))
 }
 
+/// Where the tip is across the axis when it pierces the skin and at the end of its way, m: the first and the last of
+/// [`Insertion::path_m`] of the same [`insert`], without the shape of the needle in between.
+///
+/// # Errors
+/// [`InsertionError`].
+pub fn ends(
+    needle: &Needle,
+    holder: &Holder,
+    stand_off_m: f64,
+    layers: &Layers,
+    bevel: &Bevel,
+) -> Result<[[f64; 2]; 2], InsertionError> {
+    let path = Case::new(needle, holder, stand_off_m, layers, bevel, ELEMENT_M)?.cut();
+    Ok([path[0], path[path.len() - 1]])
+}
+
 impl Insertion {
     /// Displacement of the tip, m.
     pub fn tip_m(&self) -> [f64; 2] {

@@ -23,7 +23,7 @@ mod tissue;
 
 pub use fit::{Bend, FitError, FittedForce, fit_force};
 pub use guide::{Guide, Holder};
-pub use insertion::{Bevel, Insertion, InsertionError, Slip, WARNED_SLOPE, insert};
+pub use insertion::{Bevel, Insertion, InsertionError, Slip, WARNED_SLOPE, ends, insert};
 pub use layers::{Layer, Layers, LayersError};
 pub use needle::{Gauge, Needle, NeedleError, STEEL_PA};
 pub use tissue::{

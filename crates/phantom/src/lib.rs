@@ -10,6 +10,7 @@
 mod envelope;
 mod error;
 mod half_spaces;
+mod layers;
 mod limbs;
 mod loft;
 mod markers;
@@ -42,6 +43,7 @@ pub use route_obstacles::{RouteObstacle, RouteObstacles};
 
 use envelope::Envelope;
 pub use half_spaces::HalfSpaces;
+pub use layers::{LayersError, Passed, PassedLayer};
 pub use limbs::{Support, limbs};
 pub use scan_ends::ScanEnd;
 use scan_ends::ScanEnds;

@@ -16,6 +16,7 @@ use needlebench_scenario::imperfections::{Breathing, Imperfections, SkinMarkers}
 use needlebench_scenario::{Goal, ResolvedScenario};
 use serde::Serialize;
 
+use crate::bend::Bends;
 use crate::truth::only;
 use crate::{RestingFriction, SettleError, Source, resting_friction};
 
@@ -90,6 +91,12 @@ impl BudgetCase<'_> {
         let exit = self.world_from_exit();
         self.depths_m()
             .map(|depth_m| exit * Point3::new(0.0, 0.0, depth_m))
+    }
+
+    /// How the needle bends, if it does so in tissue: the same for all sources and configurations.
+    fn bends(&self) -> Option<Bends> {
+        let needle = self.imperfections.tissue()?;
+        Some(Bends::new(needle, self.goal))
     }
 
     fn friction(&self, imperfections: &Imperfections) -> Option<RestingFriction> {
@@ -277,10 +284,12 @@ pub fn budget(
     samples: Samples,
     seed: u64,
 ) -> Result<ErrorBudget, BudgetError> {
+    let bends = case.bends();
+    let bends = bends.as_ref();
     let sources = Source::ALL
         .into_iter()
         .filter(|source| source.is_in(case.imperfections))
-        .map(|source| source_budget(case, Some(source), samples.each_source, seed))
+        .map(|source| source_budget(case, Some(source), bends, samples.each_source, seed))
         .collect::<Result<Vec<_>, _>>()?;
     let dominant = sources
         .iter()
@@ -292,7 +301,7 @@ pub fn budget(
     Ok(ErrorBudget {
         sources,
         dominant,
-        ..total_budget(case, samples.total, seed)?
+        ..totals(case, bends, samples.total, seed)?
     })
 }
 
@@ -305,14 +314,23 @@ pub fn total_budget(
     samples: usize,
     seed: u64,
 ) -> Result<ErrorBudget, BudgetError> {
+    totals(case, case.bends().as_ref(), samples, seed)
+}
+
+fn totals(
+    case: &BudgetCase<'_>,
+    bends: Option<&Bends>,
+    samples: usize,
+    seed: u64,
+) -> Result<ErrorBudget, BudgetError> {
     let at_target = |imperfections: &Imperfections| -> Result<Moments, BudgetError> {
-        let [_, at_target] = analytic::moments(case, imperfections)?;
+        let [_, at_target] = analytic::moments(case, imperfections, bends)?;
         Ok(at_target)
     };
     Ok(ErrorBudget {
         samples,
         sources: Vec::new(),
-        total: source_budget(case, None, samples, seed)?,
+        total: source_budget(case, None, bends, samples, seed)?,
         dominant: None,
         before_insertion: Some(at_target(&only(
             case.imperfections,
@@ -328,6 +346,7 @@ pub fn total_budget(
 fn source_budget(
     case: &BudgetCase<'_>,
     source: Option<Source>,
+    bends: Option<&Bends>,
     samples: usize,
     seed: u64,
 ) -> Result<SourceBudget, BudgetError> {
@@ -335,7 +354,7 @@ fn source_budget(
         || case.imperfections.clone(),
         |source| only(case.imperfections, |each| each == source),
     );
-    let errors = analytic::errors(case, &imperfections)?;
+    let errors = analytic::errors(case, &imperfections, bends)?;
     let sampled = if samples > 1 {
         Some(monte_carlo::moments(case, &imperfections, samples, seed)?)
     } else {
@@ -401,7 +420,7 @@ fn breathing_freely(imperfections: &Imperfections) -> Option<Imperfections> {
 /// # Errors
 /// [`BudgetError`].
 pub fn analytic_total(case: &BudgetCase<'_>) -> Result<[Moments; 2], BudgetError> {
-    analytic::moments(case, case.imperfections)
+    analytic::moments(case, case.imperfections, case.bends().as_ref())
 }
 
 /// A variance below this is none, m^2: a nanometre squared.

@@ -12,6 +12,7 @@
 //! formula but the model of each source. `tests/validation/budget` shares neither.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
+mod bend;
 pub mod budget;
 mod distribution;
 mod fit;
@@ -20,6 +21,7 @@ mod servo;
 mod settle;
 mod truth;
 
+pub use bend::DrawnNeedle;
 pub use servo::servo_of;
 pub use settle::{RestingFriction, SettleError, Settled, resting_friction, settle, settle_after};
-pub use truth::{Draw, Layout, Source, Truth};
+pub use truth::{Bending, Draw, Layout, Source, Truth};

@@ -9,11 +9,13 @@ use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::{Body, Chain, Dynamics, JOINT_COUNT, Joints, Pose};
 use needlebench_numerics::random::SplitMix64;
 use needlebench_scenario::imperfections::{
-    self, AbsorbedSag, ArmPopulation, Breathing, GearTwist, Imperfections, Markers, NeedleBending,
+    self, AbsorbedSag, ArmPopulation, Breathing, Cantilever, GearTwist, Imperfections, Markers,
+    NeedleBending,
 };
 use needlebench_scenario::{Goal, PlacedPhantom};
 use serde::Serialize;
 
+use crate::bend::DrawnNeedle;
 use crate::distribution::{Variable, hypercube};
 use crate::fit::{fitted, seen_off_m};
 
@@ -116,7 +118,8 @@ impl Source {
             Self::Elasticity => all.elasticity.is_some(),
             Self::Payload => all.payload.is_some(),
             Self::Friction => all.friction.is_some(),
-            Self::Guide => all.guide_clearance_m.is_some(),
+            // In tissue the play is solved with the needle.
+            Self::Guide => all.guide_clearance_m.is_some() && all.tissue().is_none(),
             Self::HandEye => all.hand_eye.is_some(),
             Self::Registration => all.registration.is_some(),
             Self::SkinMarkers => all.skin_markers.is_some(),
@@ -154,7 +157,7 @@ pub(crate) fn only(all: &Imperfections, wanted: impl Fn(Source) -> bool) -> Impe
             .clone()
             .filter(|_| wanted(Source::SkinMarkers)),
         imaging: all.imaging.filter(|_| wanted(Source::Imaging)),
-        needle: all.needle.filter(|_| wanted(Source::Needle)),
+        needle: all.needle.clone().filter(|_| wanted(Source::Needle)),
         indentation: all.indentation.filter(|_| wanted(Source::Indentation)),
         breathing: all.breathing.filter(|_| wanted(Source::Breathing)),
         drive_limit_nm: None,
@@ -219,7 +222,14 @@ impl Layout {
                         add(2, Variable::Uniform);
                     }
                     Source::Imaging => add(3, Variable::Normal),
-                    Source::Needle | Source::Indentation => add(2, Variable::Normal),
+                    Source::Needle => match imperfections.tissue() {
+                        None => add(2, Variable::Normal),
+                        Some(_) => {
+                            add(DrawnNeedle::NORMALS, Variable::Normal);
+                            add(1, Variable::Uniform);
+                        }
+                    },
+                    Source::Indentation => add(2, Variable::Normal),
                     Source::Breathing => {
                         add(1, Variable::Normal);
                         add(2, Variable::Uniform);
@@ -263,6 +273,17 @@ impl Layout {
     }
 }
 
+/// What bends a needle.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Bending {
+    /// Nothing.
+    None,
+    /// A lateral force at the tip, guide frame, N, and the needle in air.
+    Force(Vector2<f64>, Cantilever),
+    /// Tissue.
+    Tissue(Box<DrawnNeedle>),
+}
+
 /// One arm and one patient.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
@@ -282,8 +303,8 @@ pub struct Truth {
     pub needle_m: [Vector2<f64>; 2],
     /// Where the target really is beside where the image shows it, world, m.
     pub unseen_m: Vector3<f64>,
-    /// Lateral force at the needle's tip, guide frame, N, and the needle.
-    pub side_force: Option<(Vector2<f64>, NeedleBending)>,
+    /// What bends the needle.
+    pub bending: Bending,
     /// Motion of skin and target along the insertion, m.
     pub indented_m: [f64; 2],
 }
@@ -355,7 +376,10 @@ impl Truth {
             .friction
             .as_ref()
             .map(|block| joint_friction(block, factors(of(Source::Friction), block.spread)));
-        let needle_m = imperfections.guide_clearance_m.map_or_else(
+        let loose = imperfections
+            .guide_clearance_m
+            .filter(|_| Source::Guide.is_in(imperfections));
+        let needle_m = loose.map_or_else(
             || [Vector2::zeros(); 2],
             |clearance_m| {
                 let values = of(Source::Guide);
@@ -394,13 +418,19 @@ impl Truth {
             let values = Vector3::from_column_slice(of(Source::Imaging));
             shift.rotation * (place.rotation * (seen.root_m * values))
         });
-        let side_force = imperfections.needle.map(|needle| {
-            let values = of(Source::Needle);
-            // Equal and independent along both axes: any direction, and this root mean square.
-            let force_n = Vector2::new(values[0], values[1])
-                * (needle.side_force_n * std::f64::consts::FRAC_1_SQRT_2);
-            (force_n, needle)
-        });
+        let bending = match &imperfections.needle {
+            None => Bending::None,
+            Some(NeedleBending::Cantilever(needle)) => {
+                let values = of(Source::Needle);
+                // Equal and independent along both axes: any direction, and this root mean square.
+                let force_n = Vector2::new(values[0], values[1])
+                    * (needle.side_force_n * std::f64::consts::FRAC_1_SQRT_2);
+                Bending::Force(force_n, *needle)
+            }
+            Some(NeedleBending::Tissue(needle)) => {
+                Bending::Tissue(Box::new(DrawnNeedle::new(needle, of(Source::Needle))))
+            }
+        };
         let indented_m = imperfections.indentation.map_or([0.0; 2], |indentation| {
             let values = of(Source::Indentation);
             std::array::from_fn(|at| indentation.mean_m[at] + indentation.spread_m[at] * values[at])
@@ -424,7 +454,7 @@ impl Truth {
             breath_allowance_m,
             needle_m,
             unseen_m,
-            side_force,
+            bending,
             indented_m,
         })
     }
@@ -479,9 +509,25 @@ impl Truth {
     /// What bends the needle off its line counts as a motion of skin and target the other way.
     pub fn wanted(&self, goal: &Goal, planned: &[Point3<f64>; 2]) -> [Point3<f64>; 2] {
         let unseen_m = [Vector3::zeros(), self.unseen_m];
+        let bent_m = self.bent_m(goal);
         std::array::from_fn(|at| {
-            self.at_insertion(goal, at, self.shift * planned[at], unseen_m[at])
+            self.at_insertion(goal, at, self.shift * planned[at], unseen_m[at], &bent_m)
         })
+    }
+
+    /// How far the needle bends off its line at skin and target, world, m.
+    fn bent_m(&self, goal: &Goal) -> [Vector3<f64>; 2] {
+        let across = match &self.bending {
+            Bending::None => return [Vector3::zeros(); 2],
+            Bending::Force(force_n, needle) => {
+                let length_m = goal.insertion_length_m;
+                let depths_m = [goal.standoff_m.unwrap_or(0.0), length_m];
+                depths_m.map(|depth_m| force_n * needle.compliance_m_per_n(depth_m, length_m))
+            }
+            Bending::Tissue(needle) => needle.bent_m(goal),
+        };
+        let turn = goal.world_from_guide_exit.rotation;
+        across.map(|across| turn * Vector3::new(across.x, across.y, 0.0))
     }
 
     /// Where skin (0) or target (1) is when the needle is in, as the straight needle sees it, world: from where it
@@ -492,17 +538,10 @@ impl Truth {
         at: usize,
         before: Point3<f64>,
         unseen_m: Vector3<f64>,
+        bent_m: &[Vector3<f64>; 2],
     ) -> Point3<f64> {
-        let length_m = goal.insertion_length_m;
-        let depths_m = [goal.standoff_m.unwrap_or(0.0), length_m];
-        let bent_m = self
-            .side_force
-            .map_or_else(Vector3::zeros, |(force_n, needle)| {
-                let across = force_n * needle.compliance_m_per_n(depths_m[at], length_m);
-                goal.world_from_guide_exit.rotation * Vector3::new(across.x, across.y, 0.0)
-            });
         let pushed_m = goal.axis.into_inner() * self.indented_m[at];
-        before + self.breath_m[at] + unseen_m + pushed_m - bent_m
+        before + self.breath_m[at] + unseen_m + pushed_m - bent_m[at]
     }
 
     /// The goal with its target and entry point where they really are, as [`Truth::wanted`] has them; the
@@ -513,9 +552,11 @@ impl Truth {
         let entry_m = planned.entry_m.unwrap_or(planned.target_m);
         let [entry_m, target_m] = self.wanted(planned, &[entry_m, planned.target_m]);
         let known = planned.true_target_m;
+        let bent_m = self.bent_m(planned);
         Goal {
             target_m,
-            true_target_m: known.map(|at| self.at_insertion(planned, 1, at, Vector3::zeros())),
+            true_target_m: known
+                .map(|at| self.at_insertion(planned, 1, at, Vector3::zeros(), &bent_m)),
             entry_m: planned.entry_m.map(|_| entry_m),
             ..planned.clone()
         }

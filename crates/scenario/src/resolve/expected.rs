@@ -11,7 +11,7 @@ use super::arm_values::gear_twist;
 use super::gravity::makers_gravity;
 use super::imperfections::{Elasticity, Imperfections, resolve_imperfections};
 use super::library::ModelLibrary;
-use crate::scenario::{ArmClass, BreathState, ImperfectionsSection, Scenario};
+use crate::scenario::{ArmClass, BreathState, IN_EXPECTED, ImperfectionsSection, Scenario};
 
 /// The arm and patient population of the RMS tip error.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,10 +39,11 @@ pub(crate) struct RealThings<'a> {
 }
 
 impl RealThings<'_> {
-    /// The imperfections of a section.
+    /// The imperfections of a section whose needle's block stands at a place.
     pub fn resolve(
         &self,
         section: &ImperfectionsSection,
+        needle_place: &str,
         notes: &mut Vec<String>,
     ) -> Result<Imperfections, Finding> {
         let block = section.calibration.as_ref();
@@ -76,6 +77,8 @@ impl RealThings<'_> {
         let resolved = resolve_imperfections(
             self.toml,
             section,
+            needle_place,
+            self.base,
             self.robot,
             arms.as_deref(),
             elasticity.transpose()?,
@@ -146,14 +149,17 @@ impl RealThings<'_> {
         if let Some(imaging) = &section.imaging {
             blocks.imaging = Some(imaging.clone());
         }
-        match self.resolve(&blocks, notes) {
+        if let Some(needle) = &section.needle {
+            blocks.needle = Some(needle.clone());
+        }
+        match self.resolve(&blocks, IN_EXPECTED, notes) {
             Ok(imperfections) => Ok(Some(Expected {
                 class: Some(class),
                 breath: section.breath,
                 imperfections,
             })),
             // What the scenario itself requires must be possible.
-            Err(finding) if section.arm.is_some() => Err(finding),
+            Err(finding) if section.arm.is_some() || section.needle.is_some() => Err(finding),
             Err(finding) => {
                 notes.push(format!("no RMS tip error: {}", finding.message));
                 Ok(None)

@@ -41,7 +41,7 @@ use needlebench_robot::{LoadedRobot, LoadedTool, RobotDescription};
 
 use crate::engine_name::check_engine_names;
 use crate::fixtures::Fixture;
-use crate::scenario::{self, GoalSection, Scenario};
+use crate::scenario::{self, GoalSection, IN_IMPERFECTIONS, Scenario};
 use arm_values::check_brakes;
 use assumed::assume;
 pub use assumed::name_from_file;
@@ -51,8 +51,9 @@ pub use entry::{ChooseEntry, ChosenEntry, EntryChooser, GoalPlacer, NoEntry, Ope
 use excitation::{ExcitationProtocol, check_sweeps, resolve_excitation};
 pub use expected::Expected;
 use expected::RealThings;
+use goals::check_insertion;
 use goals::{BodyBoxes, Surroundings, resolve_goal};
-pub use goals::{Expectation, Goal, Roll, direction};
+pub use goals::{Expectation, Goal, NeedlePath, Roll, direction};
 pub use gravity::GravitySettings;
 use gravity::gravity_settings;
 use imperfections::Imperfections;
@@ -516,6 +517,7 @@ pub(crate) fn resolve(
             phantom: phantom.as_ref(),
             fixtures: &fixtures,
             boxes: &fixtures.iter().map(BodyBoxes::new).collect::<Vec<_>>(),
+            needle: scenario.needle_in_tissue(),
         };
         let (mut goals, mut findings) = (Vec::new(), Vec::new());
         for (index, section) in scenario.goals.iter().enumerate() {
@@ -590,11 +592,21 @@ pub(crate) fn resolve(
         has_no_goals: with_goals && scenario.goals.is_empty(),
     };
     let imperfections = scenario.imperfections.as_ref();
-    let imperfections = imperfections.map(|section| real.resolve(section, &mut notes));
+    let imperfections =
+        imperfections.map(|section| real.resolve(section, IN_IMPERFECTIONS, &mut notes));
     let mut imperfections = imperfections.transpose().map_err(one)?;
     let expected = real
         .expected(&scenario, imperfections.as_ref(), &mut notes)
         .map_err(one)?;
+    if let Some((place, _)) = scenario.needle_in_tissue() {
+        let all = imperfections
+            .as_ref()
+            .or(expected.as_ref().map(|each| &each.imperfections));
+        let needle = all.and_then(Imperfections::tissue);
+        for goal in &goals {
+            check_insertion(toml, place, needle, goal, &mut notes).map_err(one)?;
+        }
+    }
     check_brakes(toml, &scenario, &robot, &mut notes).map_err(one)?;
     let file = &source.file;
     let servo = servo_settings(file, &scenario.controller, &robot, &tool, &mut notes);

@@ -5,6 +5,7 @@
 //! from the scenario's seed; the error budget uses the distribution.
 
 mod measured;
+mod needle;
 
 use needlebench_input::{Finding, TomlText};
 use needlebench_kinematics::JOINT_COUNT;
@@ -15,6 +16,9 @@ use serde::{Deserialize, Serialize};
 use super::models::names_or_path;
 
 pub use measured::CovarianceMm2;
+pub(crate) use needle::{BevelFace, IN_EXPECTED, IN_IMPERFECTIONS};
+pub use needle::{ForcesBlock, MeasuredForce, NeedleBlock, NeedleModel, NeedleTip, StiffnessBlock};
+
 pub(crate) use measured::covariance_m2;
 
 /// Deviations of the real arm and patient from the nominal ones.
@@ -135,6 +139,8 @@ pub struct ExpectedSection {
     pub registration: Option<RegistrationBlock>,
     /// Measured covariance of the target, instead of the assumed one.
     pub imaging: Option<ImagingBlock>,
+    /// How the needle bends, instead of the assumed cantilever.
+    pub needle: Option<NeedleBlock>,
 }
 
 /// Joint origins of the real arm.
@@ -470,38 +476,6 @@ impl Default for ImagingBlock {
     }
 }
 
-/// Needle bending by a lateral force at the tip, caused by the bevel; the guide clamps the needle.
-///
-/// An Euler-Bernoulli cantilever from the guide's exit to the tip, `delta = F L^3 / (3 E I)`: the concentrated bevel
-/// force with which mechanics of needle steering begin (Misra et al., Int. J. Robotics Research 29(13), 2010). Tissue
-/// support of the shaft is neglected, so the bending is an upper estimate for the force. The bevel direction is
-/// uniform.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct NeedleBlock {
-    /// RMS lateral force at the tip, N. Assumed: 1 mm deflection of an 18 G needle with stylet, 90 mm from the guide.
-    /// Radiologists report at most 5.3 mm of unwanted bending on average (de Jong et al., Medical Devices 11, 2018,
-    /// 259-265).
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub side_force_n: f64,
-    /// Young's modulus of the needle, GPa: stainless steel.
-    #[schemars(range(min = 1.0, max = 500.0))]
-    pub young_gpa: f64,
-    /// Inner diameter of the needle, mm; 0 with the stylet inserted.
-    #[schemars(range(min = 0.0, max = 5.0))]
-    pub bore_mm: f64,
-}
-
-impl Default for NeedleBlock {
-    fn default() -> Self {
-        Self {
-            side_force_n: 0.1,
-            young_gpa: 200.0,
-            bore_mm: 0.0,
-        }
-    }
-}
-
 /// Tissue deformation along the needle, under needle, hand and guide.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -613,7 +587,7 @@ impl ImperfectionsSection {
     }
 }
 
-/// Checks the measured covariances that the RMS tip error is predicted from.
+/// Checks what replaces blocks of the imperfections that the RMS tip error is predicted from.
 pub(super) fn check_expected(toml: &TomlText<'_>, scenario: &super::Scenario) -> Vec<Finding> {
     let section = &scenario.expected;
     let mut findings = Vec::new();
@@ -627,11 +601,15 @@ pub(super) fn check_expected(toml: &TomlText<'_>, scenario: &super::Scenario) ->
     if let Some(block) = &section.imaging {
         findings.extend(measured::check_target(toml, "expected.imaging", block));
     }
-    let measured = [
+    if let Some(block) = &section.needle {
+        findings.extend(block.check(toml, IN_EXPECTED));
+    }
+    let given = [
         ("registration", section.registration.is_some()),
         ("imaging", section.imaging.is_some()),
+        ("needle", section.needle.is_some()),
     ];
-    for (block, _) in measured.into_iter().filter(|(_, given)| *given) {
+    for (block, _) in given.into_iter().filter(|(_, given)| *given) {
         if scenario.imperfections.is_some() {
             let key = format!("expected.{block}");
             let finding = toml.finding(&key, format!("`{block}` contradicts [imperfections]"));
@@ -689,6 +667,9 @@ pub(super) fn check(toml: &TomlText<'_>, section: &ImperfectionsSection) -> Vec<
     }
     if let Some(block) = &section.imaging {
         findings.extend(measured::check_target(toml, "imperfections.imaging", block));
+    }
+    if let Some(block) = &section.needle {
+        findings.extend(block.check(toml, IN_IMPERFECTIONS));
     }
     findings
 }

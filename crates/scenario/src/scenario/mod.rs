@@ -54,11 +54,14 @@ pub(crate) use goals::EVERY_CONFIGURATION;
 pub use goals::{FlangePose, GoalSection, Target};
 pub use imperfections::{
     ArmClass, BreathState, BreathingBlock, CalibrationBlock, ControlBlock, CovarianceMm2,
-    ElasticityBlock, EncoderBlock, ExpectedSection, FrictionBlock, GuideBlock, HandEyeBlock,
-    ImagingBlock, ImperfectionsSection, IndentationBlock, NeedleBlock, PayloadBlock,
-    RegistrationBlock, SkinMarkersBlock, TorqueLimitsBlock,
+    ElasticityBlock, EncoderBlock, ExpectedSection, ForcesBlock, FrictionBlock, GuideBlock,
+    HandEyeBlock, ImagingBlock, ImperfectionsSection, IndentationBlock, MeasuredForce, NeedleBlock,
+    NeedleModel, NeedleTip, PayloadBlock, RegistrationBlock, SkinMarkersBlock, StiffnessBlock,
+    TorqueLimitsBlock,
 };
-pub(crate) use imperfections::{POPULATION, covariance_m2};
+pub(crate) use imperfections::{
+    BevelFace, IN_EXPECTED, IN_IMPERFECTIONS, POPULATION, covariance_m2,
+};
 pub(crate) use iso9283::STANDARD_EDGES_MM;
 pub use iso9283::{Horizontal, Iso9283Criteria, Iso9283Section};
 pub use models::shipped_tools;
@@ -184,6 +187,22 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// The block of a needle that bends in tissue, with its key; none where it bends in air or not at all.
+    pub(crate) fn needle_in_tissue(&self) -> Option<(&'static str, &NeedleBlock)> {
+        let own = self
+            .imperfections
+            .as_ref()
+            .and_then(|section| section.needle.as_ref());
+        let places = [
+            (IN_IMPERFECTIONS, own),
+            (IN_EXPECTED, self.expected.needle.as_ref()),
+        ];
+        let given = places
+            .into_iter()
+            .find_map(|(place, block)| Some((place, block?)));
+        given.filter(|(_, block)| block.model == NeedleModel::Tissue)
+    }
+
     /// The section that defines what a class is measured against, and whether the scenario has it, or an obstacle that
     /// counts as it; none for a class of the arm and its tool alone.
     pub(crate) fn section_of(&self, class: ClearanceClass) -> Option<(&'static str, bool)> {

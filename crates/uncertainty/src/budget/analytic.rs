@@ -3,33 +3,37 @@
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, SymmetricEigen, Vector3};
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints, Pose};
 use needlebench_scenario::imperfections::{
-    AbsorbedSag, ArmPopulation, Imperfections, OriginDeviations,
+    AbsorbedSag, ArmPopulation, Imperfections, NeedleBending, OriginDeviations,
 };
 
 use super::within::Errors;
 use super::{BudgetCase, BudgetError, Moments};
+use crate::bend::Bends;
 use crate::fit::FitError;
 use crate::jitter::Jitter;
 use crate::settle::friction_error;
 use crate::truth::{joint_friction, moved_by};
-use crate::{Draw, Layout, Truth};
+use crate::{Draw, Layout, Source, Truth};
 
 /// Moments at skin and target, axes of the guide's exit.
 ///
-/// Covariances are of first order in every source but the breathing, whose moments are exact. The bias
+/// Covariances are of first order in every source but the breathing, whose moments are exact, and a needle in tissue, whose
+/// bends are drawn (`bends`; Jacobians in the logarithms of its coefficients would make them up to a fifth too wide). The bias
 /// is that of the mean arm in its mean posture, with the second-order parts of what turns: the arm's
 /// origins, its joints and the registration (milliradians over half a metre: micrometres).
 pub(super) fn moments(
     case: &BudgetCase<'_>,
     imperfections: &Imperfections,
+    bends: Option<&Bends>,
 ) -> Result<[Moments; 2], BudgetError> {
-    Ok(errors(case, imperfections)?.map(|(moments, _)| moments))
+    Ok(errors(case, imperfections, bends)?.map(|(moments, _)| moments))
 }
 
 /// The same, with how what is off is distributed.
 pub(super) fn errors(
     case: &BudgetCase<'_>,
     imperfections: &Imperfections,
+    bends: Option<&Bends>,
 ) -> Result<[(Moments, Errors); 2], BudgetError> {
     let target = case.target();
     let exit = case.world_from_exit();
@@ -40,12 +44,16 @@ pub(super) fn errors(
     let joints = JointErrors::new(case, imperfections, &truth, &target);
     let from_world = case.axes_from_world();
     let points = case.planned();
+    let bends = bends.filter(|_| imperfections.tissue().is_some());
+    // A bevel looks to a side of the patient, however the guide is turned about the needle.
+    let roll_0 = case.goal.world_from_guide_exit.rotation;
     let of_point = |index: usize, point: &Point3<f64>| -> Result<_, BudgetError> {
         let mut errors = Errors {
             mean_m: Vector3::zeros(),
             covariance_m2: Matrix3::zeros(),
             breaths: Vec::new(),
             discs: Vec::new(),
+            bend: bends.map(|bends| bends.at(index, |across| roll_0 * across)),
         };
         let jacobian = tip_jacobian(case, &target, point);
         let displaced = |errors: &Joints| mean_displacement(case, &truth, &target, errors, point);
@@ -94,7 +102,7 @@ pub(super) fn errors(
         // As the goal has the needle, which is where the posture has it.
         let inwards = case.goal.axis.into_inner();
         let beside = Matrix3::identity() - inwards * inwards.transpose();
-        if let Some(needle) = &imperfections.needle {
+        if let Some(NeedleBending::Cantilever(needle)) = &imperfections.needle {
             let [depth_m, length_m] = [case.depths_m()[index], case.depths_m()[1]];
             let bent_m = needle.side_force_n * needle.compliance_m_per_n(depth_m, length_m);
             covariance += beside * (0.5 * bent_m * bent_m);
@@ -109,7 +117,8 @@ pub(super) fn errors(
                 .breaths
                 .push((-(place.rotation * amplitude), *breathing));
         }
-        if let Some(clearance_m) = imperfections.guide_clearance_m {
+        let loose = Source::Guide.is_in(imperfections);
+        if let Some(clearance_m) = imperfections.guide_clearance_m.filter(|_| loose) {
             let lever = case.depths_m()[index] / case.cell.tool.guide_length_m();
             let axes = [Vector3::x(), Vector3::y()].map(|axis| exit.rotation * axis);
             errors.discs = [1.0 + lever, lever]

@@ -6,6 +6,7 @@ use needlebench_scenario::imperfections::Breathing;
 
 use super::Moments;
 use super::breath::breath_moments;
+use crate::bend::Bend;
 use crate::truth::{breath, disc, phase};
 
 /// What a point is off by: a normal vector, and what is not normal beside it, all independent.
@@ -19,6 +20,8 @@ pub(super) struct Errors {
     pub breaths: Vec<(Vector3<f64>, Breathing)>,
     /// Discs, by two of their half axes, in which a place is anywhere with the same probability.
     pub discs: Vec<[Vector3<f64>; 2]>,
+    /// A needle that tissue bends; then its play is in it, and there is no disc.
+    pub bend: Option<Bend>,
 }
 
 /// Points of the lattice.
@@ -26,7 +29,7 @@ const POINTS: u32 = 32_768;
 
 /// Generating vector of F. Kuo's embedded lattice rules `lattice-32001-1024-1048576.3600` (University of New South
 /// Wales), by Cools, Kuo and Nuyens, SIAM Journal on Scientific Computing 28(6), 2006: two dimensions across the widest
-/// axis, two for each of two breaths, two for each of two discs.
+/// axis, two for each of two breaths, two for each of two discs or two for a bend.
 const LATTICE: [u32; 10] = [
     1, 182_667, 469_891, 498_753, 110_745, 446_247, 250_185, 118_627, 245_333, 283_199,
 ];
@@ -58,6 +61,7 @@ impl Errors {
                 .into_iter()
                 .map(|axes| axes.map(|axis| by * axis))
                 .collect(),
+            bend: self.bend.map(|bend| bend.turned(|axis| by * axis)),
         }
     }
 
@@ -72,6 +76,11 @@ impl Errors {
         for axis in self.discs.iter().flatten() {
             // Variance of a coordinate of a uniform disc: a quarter of its radius squared.
             covariance += axis * axis.transpose() * 0.25;
+        }
+        if let Some(bend) = &self.bend {
+            let (moved, spread) = bend.moments();
+            mean += moved;
+            covariance += spread;
         }
         Moments::new(&mean, &covariance)
     }
@@ -110,7 +119,7 @@ impl Errors {
         let mut next = || {
             dimensions
                 .next()
-                .expect("two breaths and two discs at most")
+                .expect("two breaths, and two discs or a bend, at most")
         };
         let mut sum = Vector3::zeros();
         let mut weight = 1.0;
@@ -133,6 +142,9 @@ impl Errors {
         for [x, y] in &self.discs {
             let place = disc(2.0 * next() - 1.0, 2.0 * next() - 1.0);
             sum += x * place.x + y * place.y;
+        }
+        if let Some(bend) = &self.bend {
+            sum += bend.quantile([next(), next()]);
         }
         (sum, weight)
     }
@@ -221,6 +233,7 @@ mod tests {
             covariance_m2: turn * Matrix3::from_diagonal(&variances) * turn.inverse(),
             breaths: Vec::new(),
             discs: Vec::new(),
+            bend: None,
         }
     }
 

@@ -1,12 +1,14 @@
 //! Goals by a pose of the flange.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_input::{Finding, TomlText};
-use needlebench_kinematics::pose_from_rotation_vector;
+use needlebench_kinematics::{Pose, pose_from_rotation_vector};
 
 use super::checks::{true_target, unseen_entry};
+use super::needle_path::needle_path;
 use super::{Goal, Roll, Surroundings};
 use crate::scenario::GoalSection;
 
@@ -98,7 +100,7 @@ pub(super) fn from_flange_pose(
             .finding(&key("true_target_mm"), "a true target needs a [phantom]")
             .hint("it is a point of the phantom frame"));
     }
-    Ok(Goal {
+    let mut goal = Goal {
         name: section.name.clone(),
         entry_m: standoff_m.map(|distance| exit + axis.into_inner() * distance),
         target_m,
@@ -111,6 +113,16 @@ pub(super) fn from_flange_pose(
         approach_m: section.approach_mm * 1e-3,
         lesion: None,
         target_organ,
+        needle_path: None,
         expected: BTreeMap::new(),
-    })
+    };
+    if let Some((place, block)) = surroundings.needle {
+        let placed = surroundings.phantom;
+        let to_phantom =
+            placed.map_or_else(Pose::identity, |placed| placed.world_from_phantom.inverse());
+        let phantom = placed.map(|placed| &*placed.phantom);
+        let path = needle_path(text, place, block, phantom, &goal, &to_phantom)?;
+        goal.needle_path = Some(Arc::new(path));
+    }
+    Ok(goal)
 }

@@ -1,6 +1,7 @@
 //! Goals by entry and target.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_input::{Finding, TomlText, nearest_name};
@@ -8,6 +9,7 @@ use needlebench_kinematics::Pose;
 use needlebench_phantom::Phantom;
 
 use super::checks::{true_target, unseen_entry};
+use super::needle_path::needle_path;
 use super::{Goal, Roll, Surroundings};
 use crate::scenario::GoalSection;
 
@@ -141,7 +143,7 @@ pub(super) fn from_entry_and_target(
             ));
     }
     let guide_exit = guide_frame(&exit, &axis);
-    let goal = Goal {
+    let mut goal = Goal {
         name: section.name.clone(),
         entry_m: Some(on_skin),
         target_m: target,
@@ -156,8 +158,13 @@ pub(super) fn from_entry_and_target(
         approach_m: section.approach_mm * 1e-3,
         target_organ: phantom.organ_at(&target),
         lesion,
+        needle_path: None,
         expected: BTreeMap::new(),
     };
+    if let Some((place, block)) = surroundings.needle {
+        let path = needle_path(text, place, block, Some(phantom), &goal, &Pose::identity())?;
+        goal.needle_path = Some(Arc::new(path));
+    }
     Ok(GoalInPhantom(goal))
 }
 

@@ -3,8 +3,10 @@
 mod by_flange;
 mod by_points;
 mod checks;
+mod needle_path;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_cell::{CollisionBody, Robot, Tool};
@@ -15,13 +17,15 @@ use needlebench_kinematics::ik::Configuration;
 use serde::{Deserialize, Serialize};
 
 use super::phantom::{Corners, PlacedPhantom};
-use crate::scenario::{EVERY_CONFIGURATION, GoalSection};
+use crate::scenario::{EVERY_CONFIGURATION, GoalSection, NeedleBlock};
 use by_flange::from_flange_pose;
 pub(crate) use by_points::GoalInPhantom;
 pub use by_points::direction;
 use by_points::from_entry_and_target;
 pub(crate) use by_points::target_inside;
 use checks::{check_place, check_target};
+pub use needle_path::NeedlePath;
+pub(crate) use needle_path::check_insertion;
 
 /// Angle of the guide about the needle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -70,6 +74,8 @@ pub struct Goal {
     pub lesion: Option<String>,
     /// Organ that contains the target, which the needle has to enter.
     pub target_organ: Option<String>,
+    /// The needle's way through tissue; none for one that bends in air.
+    pub needle_path: Option<Arc<NeedlePath>>,
     /// Expected outcomes; `None` where nothing is expected.
     pub expected: BTreeMap<Configuration, Expectation>,
 }
@@ -94,6 +100,8 @@ pub(crate) struct Surroundings<'a> {
     pub fixtures: &'a [CollisionBody],
     /// Boxes around each of the fixtures.
     pub boxes: &'a [BodyBoxes],
+    /// A needle that bends in tissue, with the key of its block.
+    pub needle: Option<(&'static str, &'a NeedleBlock)>,
 }
 
 /// Boxes around a body and its solids, along the world's axes.

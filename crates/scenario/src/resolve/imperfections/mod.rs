@@ -3,6 +3,7 @@
 mod absorbed;
 mod arms;
 mod localised;
+mod needle;
 
 use nalgebra::Vector3;
 use needlebench_kinematics::Joints;
@@ -11,15 +12,18 @@ pub use absorbed::AbsorbedSag;
 pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
 pub use localised::{Localisation, Markers, TargetLocalisation};
+pub use needle::{Cantilever, NeedleBending, NeedleDraw, TissueError, TissueNeedle};
 pub use needlebench_cell::GearTwist;
 
 pub use super::arm_values::JointFriction;
 use super::arm_values::{joint_friction, set_point_period_ms};
+use crate::scenario::ImperfectionsSection;
 pub use crate::scenario::{ArmClass, BreathState, CalibrationBlock};
-use crate::scenario::{ImperfectionsSection, NeedleBlock};
+use needle::needle_bending;
 use needlebench_cell::Tool;
 use needlebench_input::{Finding, ModelSource, TomlText};
 use needlebench_robot::LoadedRobot;
+use std::path::Path;
 use std::sync::Arc;
 
 /// The imperfections in SI units, with what they name resolved.
@@ -62,6 +66,14 @@ pub struct Imperfections {
 }
 
 impl Imperfections {
+    /// The needle, if it bends in tissue.
+    pub fn tissue(&self) -> Option<&TissueNeedle> {
+        match &self.needle {
+            Some(NeedleBending::Tissue(needle)) => Some(needle),
+            _ => None,
+        }
+    }
+
     /// Nothing imperfect.
     pub(crate) fn none() -> Self {
         Self {
@@ -118,23 +130,6 @@ pub struct SkinMarkers {
     pub breathing: Breathing,
 }
 
-/// Bending of the needle under a force across its tip.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NeedleBending {
-    /// Root mean square of the force, N.
-    pub side_force_n: f64,
-    /// Flexural rigidity, N m^2.
-    pub rigidity_nm2: f64,
-}
-
-impl NeedleBending {
-    /// Deflection per force at a depth of a needle that is held at depth 0 and ends at `length_m`, m/N:
-    /// `s^2 (3 L - s) / (6 E I)`.
-    pub fn compliance_m_per_n(&self, depth_m: f64, length_m: f64) -> f64 {
-        depth_m * depth_m * (3.0 * length_m - depth_m) / (6.0 * self.rigidity_nm2)
-    }
-}
-
 /// Motion of skin and target along the insertion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Indentation {
@@ -189,10 +184,12 @@ pub struct Breathing {
 const DEFAULT_BUDGET_SAMPLES: u32 = 2000;
 
 /// Resolves the section, with what it leaves to the robot's arm. `arms` are the real arms of its
-/// calibration block, and `bore_clearance_m` is the tool's bore minus its needle.
+/// calibration block; the needle's block stands at `needle_place`, and files are relative to `base`.
 pub(crate) fn resolve_imperfections(
     toml: &TomlText<'_>,
     section: &ImperfectionsSection,
+    needle_place: &str,
+    base: &Path,
     robot: &LoadedRobot,
     arms: Option<&RealArms>,
     elasticity: Option<Elasticity>,
@@ -222,6 +219,16 @@ pub(crate) fn resolve_imperfections(
                 ..breathing
             },
         });
+    let guide_clearance_m = section.guide.as_ref().map(|block| {
+        block
+            .diametral_clearance_mm
+            .map_or(bore_clearance_m, |mm| mm * 1e-3)
+    });
+    let mut sources = arms.map(|arms| arms.sources.clone()).unwrap_or_default();
+    let needle = section.needle.as_ref().map(|block| {
+        let play_m = 0.5 * guide_clearance_m.unwrap_or(0.0);
+        needle_bending(toml, needle_place, block, tool, play_m, base, &mut sources)
+    });
     let friction = section.friction.as_ref();
     let control = section.control.as_ref();
     Ok(Imperfections {
@@ -252,11 +259,7 @@ pub(crate) fn resolve_imperfections(
                 Ok([period_ms, block.delay_ms, block.torque_delay_ms].map(|ms| ms * 1e-3))
             })
             .transpose()?,
-        guide_clearance_m: section.guide.as_ref().map(|block| {
-            block
-                .diametral_clearance_mm
-                .map_or(bore_clearance_m, |mm| mm * 1e-3)
-        }),
+        guide_clearance_m,
         hand_eye: section.hand_eye.as_ref().map(|block| HandEye {
             translation_m: block.translation_mm * 1e-3,
             rotation_rad: block.rotation_deg.to_radians(),
@@ -264,42 +267,12 @@ pub(crate) fn resolve_imperfections(
         registration,
         skin_markers,
         imaging: section.imaging.as_ref().map(TargetLocalisation::new),
-        needle: section
-            .needle
-            .as_ref()
-            .map(|block| needle_bending(toml, block, tool))
-            .transpose()?,
+        needle: needle.transpose()?,
         indentation: section.indentation.as_ref().map(|block| Indentation {
             mean_m: [block.skin_mm, block.target_mm].map(|mm| mm * 1e-3),
             spread_m: [block.skin_spread_mm, block.target_spread_mm].map(|mm| mm * 1e-3),
         }),
         breathing,
-        sources: arms.map(|arms| arms.sources.clone()).unwrap_or_default(),
-    })
-}
-
-/// The needle as a beam.
-fn needle_bending(
-    toml: &TomlText<'_>,
-    block: &NeedleBlock,
-    tool: &Tool,
-) -> Result<NeedleBending, Finding> {
-    let (outer_m, bore_m) = (tool.needle.outer_diameter_m, block.bore_mm * 1e-3);
-    if bore_m >= outer_m {
-        return Err(toml
-            .finding(
-                "imperfections.needle.bore_mm",
-                format!(
-                    "a needle bore of {} mm is not smaller than the needle of {:.3} mm",
-                    block.bore_mm,
-                    outer_m * 1e3
-                ),
-            )
-            .hint("0 for a needle with the stylet inserted"));
-    }
-    let area_moment_m4 = std::f64::consts::PI / 64.0 * (outer_m.powi(4) - bore_m.powi(4));
-    Ok(NeedleBending {
-        side_force_n: block.side_force_n,
-        rigidity_nm2: block.young_gpa * 1e9 * area_moment_m4,
+        sources,
     })
 }

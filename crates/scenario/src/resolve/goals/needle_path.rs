@@ -1,0 +1,151 @@
+//! What a needle passes on its way to a goal, and to which side it bends.
+
+use nalgebra::{Point3, Vector3};
+use needlebench_input::{Finding, TomlText, nearest_name};
+use needlebench_kinematics::Pose;
+use needlebench_phantom::{PassedLayer, Phantom, Tissue};
+
+use needlebench_insertion::WARNED_SLOPE;
+
+use super::Goal;
+use crate::resolve::imperfections::TissueNeedle;
+use crate::scenario::{BevelFace, NeedleBlock};
+
+/// The needle's way through tissue, for a needle that bends in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NeedlePath {
+    /// Tissues from the skin to the needle's tip, the outermost first.
+    pub layers: Vec<PassedLayer>,
+    /// Unit vector across the needle towards which a bevelled tip is pushed, away from its face: x and y of the guide's
+    /// exit at roll 0. None where the direction is not known.
+    pub pushed_towards: Option<[f64; 2]>,
+}
+
+/// Least sine of the angle between a needle and a direction that its bevel is to face.
+const LEAST_SINE: f64 = 0.2;
+
+/// The way of a goal's needle through a phantom; the goal is in the frame that `to_phantom` is from.
+pub(super) fn needle_path(
+    text: &TomlText<'_>,
+    place: &str,
+    block: &NeedleBlock,
+    phantom: Option<&Phantom>,
+    goal: &Goal,
+    to_phantom: &Pose,
+) -> Result<NeedlePath, Finding> {
+    let (Some(entry), Some(phantom)) = (goal.entry_m, phantom) else {
+        let message = format!(
+            "goal `{}` has no patient whose tissue bends its needle",
+            goal.name
+        );
+        let finding = text.finding(&format!("{place}.model"), message);
+        return Err(
+            finding.hint("add a [phantom], or `model = \"cantilever\"` for a needle in air")
+        );
+    };
+    let exit = goal.world_from_guide_exit.translation.vector;
+    let tip = Point3::from(exit + goal.axis.into_inner() * goal.insertion_length_m);
+    let [entry, tip] = [entry, tip].map(|at| to_phantom * at);
+    let layers = phantom.layers(&entry, &tip).map_err(|error| {
+        let message = format!("goal `{}`: {error}", goal.name);
+        let finding = text.finding(&format!("{place}.model"), message);
+        finding.hint("choose an entry that passes the bone: `needlebench suggest` proposes some")
+    })?;
+    let depth_m = (tip - entry).norm();
+    if let Some(turn_at_mm) = block.turn_at_mm.filter(|mm| mm * 1e-3 > depth_m) {
+        let message = format!(
+            "the needle of goal `{}` is turned at {turn_at_mm} mm, but ends {:.1} mm behind the skin",
+            goal.name,
+            depth_m * 1e3
+        );
+        let finding = text.finding(&format!("{place}.turn_at_mm"), message);
+        return Err(finding.hint("a depth between skin and tip"));
+    }
+    // Whatever the frame of the goal: towards the head and, clockwise as seen along the insertion, a quarter on.
+    let axis = (tip - entry).normalize();
+    let head = if axis.z.abs() < 0.99 {
+        Vector3::z()
+    } else {
+        Vector3::x()
+    };
+    let across = |direction: &Vector3<f64>| direction - axis * axis.dot(direction);
+    let key = format!("{place}.bevel");
+    let faced = match block.face() {
+        BevelFace::Unknown => None,
+        BevelFace::Clock(angle_rad) => {
+            let twelve = across(&head).normalize();
+            let three = axis.cross(&twelve);
+            let (sine, cosine) = libm::sincos(angle_rad);
+            Some(twelve * cosine + three * sine)
+        }
+        BevelFace::Direction(direction) => Some(Vector3::from(direction)),
+        BevelFace::Structure(name) => {
+            let middle = phantom.middle_of(name).ok_or_else(|| {
+                let message = format!("`{name}` is neither a direction nor a structure of the phantom");
+                let structures = phantom.parts.iter().filter(|part| part.tissue != Tissue::Marker);
+                let names = structures.map(|part| part.organ.as_deref().unwrap_or(&part.name));
+                let near = nearest_name(name, names);
+                text.finding(&key, message).hint(near.map_or_else(
+                    || {
+                        "`unknown`, a time such as `3:00`, `superior`, `inferior`, `left`, `right`, `anterior`, \
+                         `posterior`, or a structure such as `spine`"
+                            .to_owned()
+                    },
+                    |near| format!("did you mean `{near}`?"),
+                ))
+            })?;
+            let towards = middle - entry;
+            Some(towards - axis * axis.dot(&towards)).filter(|off| off.norm() > 0.0)
+        }
+    };
+    let pushed_towards = faced
+        .map(|faced| {
+            let off = across(&faced.normalize());
+            if off.norm() < LEAST_SINE {
+                let message = format!(
+                    "the needle of goal `{}` runs along `{}`: its bevel cannot face it",
+                    goal.name, block.bevel
+                );
+                let finding = text.finding(&key, message);
+                return Err(
+                    finding.hint("choose a direction across the needle, or a time such as `3:00`")
+                );
+            }
+            let in_guide = (to_phantom.rotation * goal.world_from_guide_exit.rotation).inverse()
+                * -off.normalize();
+            Ok([in_guide.x, in_guide.y])
+        })
+        .transpose()?;
+    Ok(NeedlePath {
+        layers,
+        pushed_towards,
+    })
+}
+
+/// Checks that a needle can be inserted on its way, and notes where it bends more than the model is for.
+pub(crate) fn check_insertion(
+    text: &TomlText<'_>,
+    place: &str,
+    needle: Option<&TissueNeedle>,
+    goal: &Goal,
+    notes: &mut Vec<String>,
+) -> Result<(), Finding> {
+    let Some((needle, path)) = needle.zip(goal.needle_path.as_ref()) else {
+        return Ok(());
+    };
+    let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+    let inserted = needle.insert(&needle.medians(), path, stand_off_m);
+    let inserted = inserted.map_err(|error| {
+        let message = format!("goal `{}`: {error}", goal.name);
+        text.finding(&format!("{place}.model"), message)
+    })?;
+    let slope = inserted.largest_slope();
+    if slope > WARNED_SLOPE {
+        notes.push(format!(
+            "goal `{}`: the needle bends to a slope of {slope:.2}, and its model is for slopes below {WARNED_SLOPE}: \
+             the bend is a rough figure",
+            goal.name
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,302 @@
+//! The needle as a beam, in air or in tissue.
+
+use std::path::Path;
+
+use needlebench_cell::Tool;
+use needlebench_input::{Finding, Location, ModelSource, TomlText, from_toml, source_of};
+use needlebench_insertion::{
+    Bevel, Factor, Guide, Holder, Insertion, InsertionError, Layers, LayersError, Needle, Point,
+    Tissue,
+};
+use serde::Deserialize;
+
+use crate::resolve::goals::NeedlePath;
+use crate::scenario::{NeedleBlock, NeedleModel, NeedleTip};
+
+/// Bending of the needle.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NeedleBending {
+    /// In air.
+    Cantilever(Cantilever),
+    /// In tissue.
+    Tissue(TissueNeedle),
+}
+
+/// A needle in air that is clamped at the guide's exit, under a force across its tip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cantilever {
+    /// Root mean square of the force, N.
+    pub side_force_n: f64,
+    /// Flexural rigidity, N m^2.
+    pub rigidity_nm2: f64,
+}
+
+impl Cantilever {
+    /// Deflection per force at a depth of a needle that is held at depth 0 and ends at `length_m`, m/N:
+    /// `s^2 (3 L - s) / (6 E I)`.
+    pub fn compliance_m_per_n(&self, depth_m: f64, length_m: f64) -> f64 {
+        depth_m * depth_m * (3.0 * length_m - depth_m) / (6.0 * self.rigidity_nm2)
+    }
+}
+
+/// A needle that cuts its path through tissue, and what is known of its forces.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TissueNeedle {
+    /// The needle.
+    pub needle: Needle,
+    /// What holds it; its play is half of the play of `[imperfections.guide]`, none without that block.
+    pub guide: Guide,
+    /// The tip.
+    pub tip: Point,
+    /// Angle of the bevel's face, rad.
+    pub bevel_rad: f64,
+    /// Standard deviation of a known direction of the bevel, rad.
+    pub bevel_spread_rad: f64,
+    /// Depth at which the needle is turned by 180 degrees, m.
+    pub turn_at_m: Option<f64>,
+    /// Force across a bevelled tip in the wall, N, of a needle of 1.27 mm in 20 kN/m2.
+    pub wall_force_n: Factor,
+    /// Whether that force was measured, and not assumed.
+    pub is_force_measured: bool,
+    /// Factor on all forces for living tissue.
+    pub living: f64,
+    /// Stiffnesses, N/m2, of fat, wall, lung and lesion.
+    pub stiffness_n_m2: [Factor; TissueNeedle::KINDS.len()],
+    /// Forces as shares of that in the wall, of the same.
+    pub force_shares: [Factor; TissueNeedle::KINDS.len()],
+}
+
+impl TissueNeedle {
+    /// The tissues that have coefficients of their own.
+    pub const KINDS: [Tissue; 4] = [Tissue::Fat, Tissue::Wall, Tissue::Lung, Tissue::Lesion];
+
+    /// The median of all that is uncertain.
+    pub fn medians(&self) -> NeedleDraw {
+        NeedleDraw {
+            needle: self.needle,
+            stiffness_n_m2: self.stiffness_n_m2.map(|each| each.median),
+            force_shares: self.force_shares.map(|each| each.median),
+            wall_force_n: self.wall_force_n.median,
+        }
+    }
+
+    /// What of an insertion the solver is asked for: along one axis across the needle, towards which the tip is pushed.
+    fn inserted<T>(
+        &self,
+        draw: &NeedleDraw,
+        path: &NeedlePath,
+        stand_off_m: f64,
+        solve: impl Fn(&Needle, &Holder, f64, &Layers, &Bevel) -> Result<T, InsertionError>,
+    ) -> Result<T, TissueError> {
+        let force_n = draw.wall_force_n * self.living * self.tip.share();
+        let layers = path.layers.iter().map(|layer| {
+            let index = Self::KINDS.iter().position(|kind| *kind == layer.tissue);
+            let (stiffness_n_m2, share) = index.map_or((0.0, 0.0), |index| {
+                (draw.stiffness_n_m2[index], draw.force_shares[index])
+            });
+            let outer_m = draw.needle.outer_m;
+            let (tissue, length_m) = (layer.tissue, layer.length_m);
+            let mut layer = tissue.layer_of(length_m, outer_m, stiffness_n_m2, force_n, share);
+            // Far tails of lognormals are beyond what the solver takes for a tissue.
+            layer.stiffness_n_m2 = layer.stiffness_n_m2.min(STIFFEST_N_M2);
+            layer.force_n = layer.force_n.min(STRONGEST_N);
+            layer
+        });
+        let layers = Layers::new(layers.collect())?;
+        let bevel = Bevel {
+            towards: [1.0, 0.0],
+            angle_rad: self.bevel_rad,
+            turn_at_m: self.turn_at_m,
+        };
+        let holder = Holder::Guide(self.guide);
+        Ok(solve(&draw.needle, &holder, stand_off_m, &layers, &bevel)?)
+    }
+
+    /// The needle at the end of its way, along one axis across it: y of the solver's frame is towards where the tip is pushed.
+    ///
+    /// # Errors
+    /// [`TissueError`] for sizes that no needle or guide has.
+    pub fn insert(
+        &self,
+        draw: &NeedleDraw,
+        path: &NeedlePath,
+        stand_off_m: f64,
+    ) -> Result<Insertion, TissueError> {
+        self.inserted(draw, path, stand_off_m, needlebench_insertion::insert)
+    }
+
+    /// How far the tip is off the axis where it pierces the skin and at the end of its way, m, towards where it is pushed.
+    ///
+    /// # Errors
+    /// [`TissueError`] as of [`Self::insert`].
+    pub fn bends_m(
+        &self,
+        draw: &NeedleDraw,
+        path: &NeedlePath,
+        stand_off_m: f64,
+    ) -> Result<[f64; 2], TissueError> {
+        let ends = self.inserted(draw, path, stand_off_m, needlebench_insertion::ends)?;
+        Ok(ends.map(|[towards, _]| towards))
+    }
+}
+
+/// Stiffest tissue, N/m2, and strongest force across a tip, N, that the solver takes.
+const STIFFEST_N_M2: f64 = 1e6;
+const STRONGEST_N: f64 = 5.0;
+
+/// A needle, and the tissues of a patient.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NeedleDraw {
+    /// The needle.
+    pub needle: Needle,
+    /// Stiffnesses, N/m2, by [`TissueNeedle::KINDS`].
+    pub stiffness_n_m2: [f64; TissueNeedle::KINDS.len()],
+    /// Forces as shares of that in the wall, of the same.
+    pub force_shares: [f64; TissueNeedle::KINDS.len()],
+    /// Force across a bevelled tip in the wall, N, of a needle of 1.27 mm in 20 kN/m2.
+    pub wall_force_n: f64,
+}
+
+/// Why a needle is not inserted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TissueError {
+    /// The layers.
+    #[error(transparent)]
+    Layers(#[from] LayersError),
+    /// Needle, guide or bevel.
+    #[error(transparent)]
+    Insertion(#[from] InsertionError),
+}
+
+/// What `needle fit` writes.
+#[derive(Debug, Deserialize)]
+struct Fitted {
+    tip_force_n: f64,
+    interval_95_n: [f64; 2],
+}
+
+/// Half of the width of a normal's 95 % interval, standard deviations.
+const HALF_95: f64 = 1.959_963_984_540_054;
+
+/// The bending of a block that stands at `place`; its play is `play_m` to either side.
+pub(super) fn needle_bending(
+    toml: &TomlText<'_>,
+    place: &str,
+    block: &NeedleBlock,
+    tool: &Tool,
+    play_m: f64,
+    base: &Path,
+    sources: &mut Vec<ModelSource>,
+) -> Result<NeedleBending, Finding> {
+    let (outer_m, bore_m) = (tool.needle.outer_diameter_m, block.bore_mm * 1e-3);
+    if bore_m >= outer_m {
+        return Err(toml
+            .finding(
+                &format!("{place}.bore_mm"),
+                format!(
+                    "a needle bore of {} mm is not smaller than the needle of {:.3} mm",
+                    block.bore_mm,
+                    outer_m * 1e3
+                ),
+            )
+            .hint("0 for a needle with the stylet inserted"));
+    }
+    let needle = Needle {
+        outer_m,
+        inner_m: bore_m,
+        has_stylet: bore_m == 0.0,
+        young_pa: block.young_gpa * 1e9,
+    };
+    if block.model == NeedleModel::Cantilever {
+        return Ok(NeedleBending::Cantilever(Cantilever {
+            side_force_n: block.side_force_n,
+            rigidity_nm2: needle.bending_stiffness_nm2(),
+        }));
+    }
+    let forces = &block.forces;
+    let mut wall_force_n = Factor {
+        median: forces.wall_n,
+        spread: forces.wall_spread,
+    };
+    if let Some(measured) = &block.measured {
+        let key = format!("{place}.measured.file");
+        let (factor, source) = fitted(toml, &key, &measured.file, base)?;
+        wall_force_n = factor;
+        sources.push(source);
+    }
+    let stiffness = &block.stiffness;
+    let stiffnesses = [
+        stiffness.fat_kn_m2,
+        stiffness.wall_kn_m2,
+        stiffness.lung_kn_m2,
+        stiffness.lesion_kn_m2,
+    ];
+    let shares = [
+        forces.fat_share,
+        1.0,
+        forces.lung_share,
+        forces.lesion_share,
+    ];
+    let kinds = TissueNeedle::KINDS;
+    Ok(NeedleBending::Tissue(TissueNeedle {
+        needle,
+        guide: Guide {
+            length_m: tool.guide_length_m(),
+            play_m,
+        },
+        tip: match block.tip {
+            NeedleTip::Bevel => Point::Bevel,
+            NeedleTip::Symmetric => Point::Symmetric,
+            NeedleTip::Rolled => Point::Rolled,
+        },
+        bevel_rad: block.bevel_deg.to_radians(),
+        bevel_spread_rad: block.bevel_spread_deg.to_radians(),
+        turn_at_m: block.turn_at_mm.map(|mm| mm * 1e-3),
+        wall_force_n,
+        is_force_measured: block.measured.is_some(),
+        living: forces.living,
+        stiffness_n_m2: std::array::from_fn(|index| Factor {
+            median: stiffnesses[index] * 1e3,
+            ..kinds[index].stiffness_n_m2()
+        }),
+        force_shares: std::array::from_fn(|index| Factor {
+            median: shares[index],
+            ..kinds[index].force_share()
+        }),
+    }))
+}
+
+/// The force that a file of `needle fit` has.
+fn fitted(
+    toml: &TomlText<'_>,
+    key: &str,
+    file: &str,
+    base: &Path,
+) -> Result<(Factor, ModelSource), Finding> {
+    let location = Location::Disk(base.join(file));
+    let shown = location.display();
+    let bytes = location.read().map_err(|error| {
+        let finding = toml.finding(key, format!("cannot read `{shown}`: {error}"));
+        finding.hint("`needlebench needle fit BENDS.csv --output FILE` writes it")
+    })?;
+    let text = String::from_utf8(bytes.clone())
+        .map_err(|_| Finding::new(&shown, "the file is not UTF-8 text"))?;
+    let Fitted {
+        tip_force_n,
+        interval_95_n: [low_n, high_n],
+    } = from_toml(&shown, &text)?;
+    if !(0.0 < low_n && low_n <= tip_force_n && tip_force_n <= high_n && high_n <= 5.0) {
+        let message = format!(
+            "`tip_force_n` of {tip_force_n} N with an interval of {low_n} to {high_n} N is no force across a tip"
+        );
+        return Err(Finding::new(&shown, message).key("interval_95_n").hint(
+            "above 0 and at most 5 N, the force in its interval; an interval that reaches 0 says nothing: record more bends",
+        ));
+    }
+    let spread = libm::exp(libm::log(high_n / low_n) / (2.0 * HALF_95));
+    let factor = Factor {
+        median: tip_force_n,
+        spread,
+    };
+    Ok((factor, source_of(shown, &bytes)))
+}

@@ -1,0 +1,210 @@
+//! The bend of a needle in tissue: one draw of it, and its distribution.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+use needlebench_insertion::{Factor, MODEL, Point};
+use needlebench_numerics::random::SplitMix64;
+use needlebench_scenario::Goal;
+use needlebench_scenario::imperfections::{NeedleDraw, TissueNeedle};
+
+use crate::distribution::{Variable, hypercube};
+
+/// Relative standard deviation of Young's modulus from one alloy to another.
+const YOUNG_SPREAD: f64 = 0.05;
+
+/// One needle in one patient.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrawnNeedle {
+    needle: TissueNeedle,
+    draw: NeedleDraw,
+    /// How much more it bends than the model says.
+    model: f64,
+    /// Of the bevel: from where it is known to be, as a standard normal value, and where it is if that is not known, uniform in
+    /// (-1, 1).
+    turned: [f64; 2],
+}
+
+impl DrawnNeedle {
+    /// Standard normal variables that it is made of: Young's modulus, a stiffness and a share of the force for each tissue,
+    /// the force, the model, the direction. A uniform one follows.
+    pub(crate) const NORMALS: usize = 4 + 2 * TissueNeedle::KINDS.len();
+
+    /// From the values of its variables.
+    pub(crate) fn new(needle: &TissueNeedle, values: &[f64]) -> Self {
+        let kinds = TissueNeedle::KINDS.len();
+        let lognormal = |factor: &Factor, value: f64| {
+            factor.median * libm::exp(libm::log(factor.spread) * value)
+        };
+        let of = |factors: &[Factor; TissueNeedle::KINDS.len()], values: &[f64]| {
+            std::array::from_fn(|index| lognormal(&factors[index], values[index]))
+        };
+        let (stiffnesses, rest) = values[4..].split_at(kinds);
+        let mut draw = NeedleDraw {
+            needle: needle.needle,
+            stiffness_n_m2: of(&needle.stiffness_n_m2, stiffnesses),
+            force_shares: of(&needle.force_shares, rest),
+            wall_force_n: lognormal(&needle.wall_force_n, values[1]),
+        };
+        draw.needle.young_pa *= libm::exp(YOUNG_SPREAD * values[0]);
+        Self {
+            needle: needle.clone(),
+            draw,
+            model: lognormal(&MODEL, values[2]),
+            turned: [values[3], rest[kinds]],
+        }
+    }
+
+    /// How far it is off a goal's axis at skin and tip, m, towards where its bevel pushes it.
+    pub(crate) fn sizes_m(&self, goal: &Goal) -> [f64; 2] {
+        let Some(path) = &goal.needle_path else {
+            return [0.0; 2];
+        };
+        let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+        let bends_m = self.needle.bends_m(&self.draw, path, stand_off_m);
+        let [at_skin, at_tip] = bends_m.expect("tried with the medians when the goal was resolved");
+        [at_skin, at_tip * self.model]
+    }
+
+    /// The same across the guide's exit at roll 0, m.
+    pub(crate) fn bent_m(&self, goal: &Goal) -> [Vector2<f64>; 2] {
+        let [known, anywhere] = self.turned;
+        let (from, angle_rad) = match direction(&self.needle, goal) {
+            Some(towards) => (towards, self.needle.bevel_spread_rad * known),
+            None => (Vector2::x(), PI * anywhere),
+        };
+        let (sine, cosine) = libm::sincos(angle_rad);
+        let towards = from * cosine + across(&from) * sine;
+        self.sizes_m(goal).map(|size_m| towards * size_m)
+    }
+}
+
+/// Where a goal's needle is pushed, if that is known.
+pub(crate) fn direction(needle: &TissueNeedle, goal: &Goal) -> Option<Vector2<f64>> {
+    let known = goal
+        .needle_path
+        .as_ref()
+        .and_then(|path| path.pushed_towards);
+    known
+        .filter(|_| needle.tip == Point::Bevel)
+        .map(Vector2::from)
+}
+
+/// A quarter further.
+pub(crate) fn across(towards: &Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(-towards.y, towards.x)
+}
+
+/// Draws that the distribution of a bend is known by: its mean to 0.5 %, its standard deviation to 2 % (tests).
+const DRAWS: usize = 512;
+
+/// Bends of many needles in many patients at one goal.
+#[derive(Debug, Clone)]
+pub(crate) struct Bends {
+    /// At skin and tip, m, the least first.
+    sizes_m: [Vec<f64>; 2],
+    /// The mean direction and, a quarter further, the one across it, guide's exit at roll 0; and the standard deviation of
+    /// the angle, rad, or none where any angle is as likely.
+    axes: [Vector2<f64>; 2],
+    spread_rad: Option<f64>,
+}
+
+impl Bends {
+    /// Of a needle at a goal: the same draws for every one.
+    pub fn new(needle: &TissueNeedle, goal: &Goal) -> Self {
+        let mut variables = vec![Variable::Normal; DrawnNeedle::NORMALS];
+        variables.push(Variable::Uniform);
+        let rows = hypercube(&variables, DRAWS, &mut SplitMix64::new(0));
+        let mut sizes_m = [Vec::with_capacity(DRAWS), Vec::with_capacity(DRAWS)];
+        for row in rows {
+            let drawn_m = DrawnNeedle::new(needle, &row).sizes_m(goal);
+            for (all_m, size_m) in sizes_m.iter_mut().zip(drawn_m) {
+                all_m.push(size_m);
+            }
+        }
+        for all_m in &mut sizes_m {
+            all_m.sort_by(f64::total_cmp);
+        }
+        let towards = direction(needle, goal);
+        let from = towards.unwrap_or_else(Vector2::x);
+        Self {
+            sizes_m,
+            axes: [from, across(&from)],
+            spread_rad: towards.map(|_| needle.bevel_spread_rad),
+        }
+    }
+
+    /// At skin (0) or tip (1), along the axes of the guide's exit turned by `turn`.
+    pub fn at(&self, index: usize, turn: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Bend {
+        Bend {
+            sizes_m: self.sizes_m[index].clone(),
+            axes: self
+                .axes
+                .map(|axis| turn(Vector3::new(axis.x, axis.y, 0.0))),
+            spread_rad: self.spread_rad,
+        }
+    }
+}
+
+/// Bends at one place.
+#[derive(Debug, Clone)]
+pub(crate) struct Bend {
+    sizes_m: Vec<f64>,
+    axes: [Vector3<f64>; 2],
+    spread_rad: Option<f64>,
+}
+
+impl Bend {
+    /// The same along other axes.
+    pub fn turned(self, turn: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Self {
+        Self {
+            axes: self.axes.map(turn),
+            ..self
+        }
+    }
+
+    /// Mean and covariance, m, m^2.
+    pub fn moments(&self) -> (Vector3<f64>, Matrix3<f64>) {
+        let count = self.sizes_m.len() as f64;
+        let mean_m = self.sizes_m.iter().sum::<f64>() / count;
+        let square_m2 = self.sizes_m.iter().map(|size| size * size).sum::<f64>() / count;
+        let squares = self.axes.map(|axis| axis * axis.transpose());
+        match self.spread_rad {
+            None => (
+                Vector3::zeros(),
+                (squares[0] + squares[1]) * (0.5 * square_m2),
+            ),
+            Some(spread_rad) => {
+                // Of a normal angle: E cos, E cos^2, E sin^2.
+                let shrunk = libm::exp(-0.5 * spread_rad * spread_rad);
+                let twice = libm::exp(-2.0 * spread_rad * spread_rad);
+                let mean = self.axes[0] * (mean_m * shrunk);
+                let second =
+                    squares[0] * (0.5 * (1.0 + twice)) + squares[1] * (0.5 * (1.0 - twice));
+                (mean, second * square_m2 - mean * mean.transpose())
+            }
+        }
+    }
+
+    /// The bend at two shares of all, each in (0, 1): of its size, and of its direction.
+    pub fn quantile(&self, [size, angle]: [f64; 2]) -> Vector3<f64> {
+        let at = size * self.sizes_m.len() as f64 - 0.5;
+        let last = self.sizes_m.len() - 1;
+        let below = at.clamp(0.0, last as f64);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between 0 and the number of draws"
+        )]
+        let index = (below as usize).min(last.saturating_sub(1));
+        let next = (index + 1).min(last);
+        let share = below - index as f64;
+        let size_m = self.sizes_m[index] * (1.0 - share) + self.sizes_m[next] * share;
+        let angle_rad = match self.spread_rad {
+            None => PI * (2.0 * angle - 1.0),
+            Some(spread_rad) => spread_rad * needlebench_numerics::normal::quantile(angle),
+        };
+        let (sine, cosine) = libm::sincos(angle_rad);
+        (self.axes[0] * cosine + self.axes[1] * sine) * size_m
+    }
+}
