@@ -137,6 +137,7 @@ const LAYERS: [(&str, &[&str]); 37] = [
     (
         "bench",
         &[
+            "insertion",
             "iso9283",
             "evaluation",
             "patient",

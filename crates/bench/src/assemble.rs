@@ -31,6 +31,7 @@ use needlebench_uncertainty::Source;
 use crate::adjudication::Adjudicated;
 use crate::budgets::Budgets;
 use crate::events::{EventRun, events_report};
+use crate::needle::needle_report;
 use crate::provenance::provenance;
 use crate::setup::Setup;
 use crate::simulate::EngineRun;
@@ -78,8 +79,9 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
         .zip(results.runs)
         .zip(results.adjudicated)
         .enumerate()
-        .map(|(index, ((plan, runs), adjudicated))| {
-            goal_report(&context, index, plan, runs, adjudicated)
+        .map(|(index, ((plan, runs), adjudicated))| GoalReport {
+            needle: needle_report(resolved, &resolved.goals[index]),
+            ..goal_report(&context, index, plan, runs, adjudicated)
         })
         .collect();
     let (verdict, judged) = judge(
@@ -245,6 +247,7 @@ pub(crate) fn goal_report(
         standoff_m: goal.standoff_m,
         needle_route: route_report(resolved, goal),
         fissures_crossed: crossed_fissures(resolved, goal),
+        needle: None,
         configurations: plan
             .configurations
             .iter()

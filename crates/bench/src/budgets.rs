@@ -62,6 +62,8 @@ pub(crate) fn analytic_budget(moments: [Moments; 2]) -> ErrorBudget {
         },
         dominant: None,
         before_insertion: None,
+        in_tissue: None,
+        of_breath: None,
         breathing_freely: None,
     }
 }

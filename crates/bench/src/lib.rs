@@ -23,6 +23,7 @@ pub mod excitation;
 mod iso9283;
 pub mod judge;
 pub mod motion;
+mod needle;
 mod plan;
 pub mod preview;
 pub mod provenance;

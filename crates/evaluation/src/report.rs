@@ -138,6 +138,9 @@ pub struct GoalReport {
     pub needle_route: Option<RouteReport>,
     /// Fissures of the lungs that the planned needle crosses.
     pub fissures_crossed: Vec<String>,
+    /// How the needle bends in tissue; none for one that bends in air.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub needle: Option<NeedleReport>,
     /// All eight configurations.
     pub configurations: Vec<ConfigurationReport>,
     /// The recommended one; none if none is feasible.
@@ -159,6 +162,102 @@ pub struct RouteReport {
     pub margin_m: f64,
     /// The margin is kept; if not, every configuration is rejected.
     pub kept: bool,
+}
+
+/// How a goal's needle bends in tissue, and what can be done about it: of many needles in many patients, the same draws
+/// everywhere. Bends are those of the tip at the end of its way, towards where its bevel pushes it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NeedleReport {
+    /// The answer, in a sentence.
+    pub summary: String,
+    /// Gauge.
+    pub gauge: u32,
+    /// Outer diameter.
+    pub outer_diameter_m: f64,
+    /// Bending stiffness.
+    pub bending_stiffness_nm2: f64,
+    /// `bevel`, `symmetric` or `rolled`.
+    pub tip: &'static str,
+    /// Tissues from the skin to the tip.
+    pub layers: Vec<NeedleLayer>,
+    /// Direction in the patient's frame (left, posterior, superior) towards which the tip is pushed; none where any direction
+    /// is as likely.
+    pub pushed_towards: Option<[f64; 3]>,
+    /// The bend.
+    pub bend: BendSummary,
+    /// How far it is bent where it first enters a lung, by medians; none where it enters none.
+    pub bend_at_pleura_m: Option<f64>,
+    /// The largest slope, by medians: the model is for slopes below 0.1.
+    pub largest_slope: f64,
+    /// What the needle cuts by medians: depth behind the skin and how far the path is off the axis there.
+    pub path_m: Vec<[f64; 2]>,
+    /// Turned by 180 degrees at the depth where that helps most; none for a tip without a direction, and for a needle that is
+    /// turned as it is.
+    pub turned: Option<TurnedNeedle>,
+    /// Root mean square of what is left if the axis is aimed against the mean bend; none where the direction is not known.
+    pub aimed_rms_m: Option<f64>,
+    /// What other needles, guides and hands would give.
+    pub alternatives: Vec<NeedleAlternative>,
+    /// For a tip that is pushed to one side: what the bent needle keeps from bone, vessels and organs for twelve directions of
+    /// the bevel's face, the largest distance first.
+    pub faces: Vec<BevelDirection>,
+    /// What of it is assumed, and not measured with this needle.
+    pub assumed: Vec<&'static str>,
+}
+
+/// A layer that a needle passes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NeedleLayer {
+    /// `fat`, `wall`, `lung`, `lesion`, `gas` or `fluid`.
+    pub tissue: &'static str,
+    /// Length along the needle.
+    pub length_m: f64,
+    /// Median of the lateral force per length per displacement.
+    pub stiffness_n_m2: f64,
+    /// Median of the force across the tip.
+    pub force_n: f64,
+}
+
+/// Bends of many needles.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BendSummary {
+    /// Median.
+    pub median_m: f64,
+    /// 5 % bend less.
+    pub p05_m: f64,
+    /// 5 % bend more.
+    pub p95_m: f64,
+    /// Root mean square.
+    pub rms_m: f64,
+}
+
+/// A needle that is turned on its way.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TurnedNeedle {
+    /// Depth behind the skin at which it is turned.
+    pub at_m: f64,
+    /// Root mean square of the bend then.
+    pub rms_m: f64,
+}
+
+/// Another needle, guide or hand.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NeedleAlternative {
+    /// What is other.
+    pub what: String,
+    /// How it bends.
+    pub bend: BendSummary,
+}
+
+/// A direction of a bevel's face, and what the needle keeps away from then.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BevelDirection {
+    /// On a clock seen by whoever holds the hub, 12:00 towards the patient's head.
+    pub clock: String,
+    /// The structure that the bent needle comes nearest to.
+    pub part: String,
+    /// Signed distance of its surface, negative inside.
+    pub distance_m: f64,
 }
 
 /// Which configuration to choose.

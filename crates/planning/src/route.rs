@@ -65,22 +65,60 @@ fn nearest_of<'a>(
     entered: &Entered<'_, '_>,
     wanted: impl Fn(&RouteObstacle) -> bool,
 ) -> Option<RouteClearance<'a>> {
+    nearest_along(
+        cell,
+        placed,
+        &[goal.entry_m?, needle_end(goal)],
+        entered,
+        wanted,
+    )
+}
+
+/// The same of a needle through points, world.
+fn nearest_along<'a>(
+    cell: &Cell,
+    placed: &'a PlacedPhantom,
+    points: &[Point3<f64>],
+    entered: &Entered<'_, '_>,
+    wanted: impl Fn(&RouteObstacle) -> bool,
+) -> Option<RouteClearance<'a>> {
     let obstacles = placed.phantom.route_obstacles();
-    let entry = goal.entry_m?;
     let counts = |index: usize| {
         let part = &obstacles.parts[index];
         wanted(part) && !entered.is(part)
     };
-    let (index, separation) = obstacles.solids.nearest_to_segment(
-        &entry,
-        &needle_end(goal),
-        0.5 * cell.tool.needle.outer_diameter_m,
-        &placed.world_from_phantom,
-        counts,
-    )?;
-    Some(RouteClearance {
-        part: &obstacles.parts[index],
-        separation,
+    let nearest = points.windows(2).filter_map(|ends| {
+        let (index, separation) = obstacles.solids.nearest_to_segment(
+            &ends[0],
+            &ends[1],
+            0.5 * cell.tool.needle.outer_diameter_m,
+            &placed.world_from_phantom,
+            counts,
+        )?;
+        Some(RouteClearance {
+            part: &obstacles.parts[index],
+            separation,
+        })
+    });
+    nearest.reduce(|a, b| {
+        if b.separation.distance_m < a.separation.distance_m {
+            b
+        } else {
+            a
+        }
+    })
+}
+
+/// What of bone, vessels and organs a bent needle of a goal comes nearest to, apart from what it has to enter: through
+/// points from the skin to its tip, world.
+pub fn bent_route<'a>(
+    cell: &Cell,
+    placed: &'a PlacedPhantom,
+    goal: &Goal,
+    points: &[Point3<f64>],
+) -> Option<RouteClearance<'a>> {
+    nearest_along(cell, placed, points, &Entered::new(placed, goal), |part| {
+        part.tissue != Tissue::Fissure
     })
 }
 

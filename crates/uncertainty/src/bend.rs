@@ -96,7 +96,17 @@ pub(crate) fn across(towards: &Vector2<f64>) -> Vector2<f64> {
 }
 
 /// Draws that the distribution of a bend is known by: its mean to 0.5 %, its standard deviation to 2 % (tests).
-const DRAWS: usize = 512;
+pub const DRAWS: usize = 512;
+
+/// How far needles are off a goal's axis where they pierce the skin and at their tips, m, towards where their bevel pushes
+/// them: the same draws of patients and needles for every needle and goal, as many as are asked for.
+pub fn drawn_bends_m(needle: &TissueNeedle, goal: &Goal, draws: usize) -> Vec<[f64; 2]> {
+    let mut variables = vec![Variable::Normal; DrawnNeedle::NORMALS];
+    variables.push(Variable::Uniform);
+    let rows = hypercube(&variables, draws, &mut SplitMix64::new(0));
+    let sizes_m = |row: Vec<f64>| DrawnNeedle::new(needle, &row).sizes_m(goal);
+    rows.into_iter().map(sizes_m).collect()
+}
 
 /// Bends of many needles in many patients at one goal.
 #[derive(Debug, Clone)]
@@ -112,19 +122,12 @@ pub(crate) struct Bends {
 impl Bends {
     /// Of a needle at a goal: the same draws for every one.
     pub fn new(needle: &TissueNeedle, goal: &Goal) -> Self {
-        let mut variables = vec![Variable::Normal; DrawnNeedle::NORMALS];
-        variables.push(Variable::Uniform);
-        let rows = hypercube(&variables, DRAWS, &mut SplitMix64::new(0));
-        let mut sizes_m = [Vec::with_capacity(DRAWS), Vec::with_capacity(DRAWS)];
-        for row in rows {
-            let drawn_m = DrawnNeedle::new(needle, &row).sizes_m(goal);
-            for (all_m, size_m) in sizes_m.iter_mut().zip(drawn_m) {
-                all_m.push(size_m);
-            }
-        }
-        for all_m in &mut sizes_m {
+        let drawn_m = drawn_bends_m(needle, goal, DRAWS);
+        let sizes_m = [0, 1].map(|index| {
+            let mut all_m: Vec<f64> = drawn_m.iter().map(|both_m| both_m[index]).collect();
             all_m.sort_by(f64::total_cmp);
-        }
+            all_m
+        });
         let towards = direction(needle, goal);
         let from = towards.unwrap_or_else(Vector2::x);
         Self {

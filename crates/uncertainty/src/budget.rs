@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use crate::bend::Bends;
 use crate::truth::only;
-use crate::{RestingFriction, SettleError, Source, resting_friction};
+use crate::{RestingFriction, SettleError, Source, Stage, resting_friction};
 
 /// What a budget is made for: one configuration of one goal.
 #[derive(Debug, Clone, Copy)]
@@ -258,6 +258,12 @@ pub struct ErrorBudget {
     /// Of the needle's line at the target before it goes in, in a phantom that lies still: without
     /// markers that move, bending, indentation and breathing. By Jacobians; none in a budget of totals.
     pub before_insertion: Option<Moments>,
+    /// Of what tissue does to the needle, at the target: bending with play, and indentation. None in a budget of totals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub in_tissue: Option<Moments>,
+    /// Of the breath, at the target: how it is held, and markers that move with the skin. None in a budget of totals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of_breath: Option<Moments>,
     /// At the target of a patient who breathes freely, where the breath is held in the rest of the
     /// budget. By Jacobians; none in a budget of totals.
     pub breathing_freely: Option<Moments>,
@@ -298,9 +304,16 @@ pub fn budget(
             rms(a).total_cmp(&rms(b))
         })
         .and_then(|each| each.source);
+    let of_stage = |stage: Stage| -> Result<Option<Moments>, BudgetError> {
+        let all = only(case.imperfections, |source| source.stage() == stage);
+        let [_, at_target] = analytic::moments(case, &all, bends)?;
+        Ok(Some(at_target))
+    };
     Ok(ErrorBudget {
         sources,
         dominant,
+        in_tissue: of_stage(Stage::InTissue)?,
+        of_breath: of_stage(Stage::Breath)?,
         ..totals(case, bends, samples.total, seed)?
     })
 }
@@ -336,6 +349,8 @@ fn totals(
             case.imperfections,
             Source::is_before_insertion,
         ))?),
+        in_tissue: None,
+        of_breath: None,
         breathing_freely: breathing_freely(case.imperfections)
             .map(|free| at_target(&free))
             .transpose()?,

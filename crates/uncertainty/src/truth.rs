@@ -54,7 +54,27 @@ pub enum Source {
     Breathing,
 }
 
+/// When a source acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Before the needle goes in.
+    BeforeInsertion,
+    /// While it goes through tissue.
+    InTissue,
+    /// With the patient's breath: the target's, and that of markers on the skin.
+    Breath,
+}
+
 impl Source {
+    /// When it acts.
+    pub fn stage(self) -> Stage {
+        match self {
+            Self::Needle | Self::Indentation => Stage::InTissue,
+            Self::SkinMarkers | Self::Breathing => Stage::Breath,
+            _ => Stage::BeforeInsertion,
+        }
+    }
+
     /// All of them, in the order of reports.
     pub const ALL: [Self; 13] = [
         Self::Calibration,
@@ -75,10 +95,7 @@ impl Source {
     /// Whether it is there before the needle goes in: what a needle's line is off by in a phantom that
     /// lies still, which robots are measured by without deploying the needle.
     pub fn is_before_insertion(self) -> bool {
-        !matches!(
-            self,
-            Self::SkinMarkers | Self::Needle | Self::Indentation | Self::Breathing
-        )
+        self.stage() == Stage::BeforeInsertion
     }
 
     /// Name in reports.

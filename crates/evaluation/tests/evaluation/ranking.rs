@@ -76,6 +76,8 @@ fn budget(rms_m: f64) -> ErrorBudget {
         },
         dominant: None,
         before_insertion: Some(moments),
+        in_tissue: None,
+        of_breath: None,
         breathing_freely: Some(moments),
     }
 }
@@ -188,6 +190,7 @@ fn goal(configurations: Vec<ConfigurationReport>) -> GoalReport {
         standoff_m: None,
         needle_route: None,
         fissures_crossed: Vec::new(),
+        needle: None,
         configurations,
         recommended: None,
         ranking: None,

@@ -78,6 +78,7 @@ fn report(configurations: Vec<ConfigurationReport>) -> Vec<GoalReport> {
         standoff_m: None,
         needle_route: None,
         fissures_crossed: Vec::new(),
+        needle: None,
         configurations,
         recommended: None,
         ranking: None,

@@ -343,6 +343,8 @@ mod tests {
                 total: of(None, rms_m),
                 dominant: None,
                 before_insertion: None,
+                in_tissue: None,
+                of_breath: None,
                 breathing_freely: None,
             };
             let budgets = [("Right-Down-Unfold", &budget), ("Left-Up-Fold", &budget)];

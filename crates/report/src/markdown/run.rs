@@ -10,6 +10,7 @@ use needlebench_show::markdown::{inline, paragraph};
 use super::ranking::ranking_markdown;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::judged::judged_blocks;
+use crate::table::needle::needle_blocks;
 use crate::table::shown::{Shown, shown_metrics};
 use crate::table::true_target::true_target_in_words;
 use crate::table::verdict::{counts, qualifies, qualifying, status};
@@ -67,6 +68,10 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         }
         if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
             writeln!(out, "{words}\n")?;
+        }
+        if let Some(needle) = &goal.needle {
+            writeln!(out, "{}\n", inline(&needle.summary))?;
+            super::study::write_blocks(out, &needle_blocks(needle))?;
         }
         if let Some(words) = true_target_in_words(goal) {
             writeln!(out, "{words}\n")?;

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 use needlebench_show::{layout, plain_table};
-use needlebench_uncertainty::budget::{ErrorBudget, SourceBudget};
+use needlebench_uncertainty::budget::{ErrorBudget, Moments, SourceBudget};
 
 /// Mean of the largest errors that 153 interventional radiologists allow, m.
 pub(crate) const ALLOWED_M: f64 = 2.7e-3;
@@ -80,8 +80,49 @@ pub(crate) fn budget_text(goal: &GoalReport) -> Option<String> {
         }
     );
     // Writing to a String cannot fail.
+    let _ = write_stages(&mut text, goal, &budgets);
     let _ = write_remarks(&mut text, goal, &budgets);
     Some(text)
+}
+
+/// What is off before the needle goes in, what tissue does to it, and what the breath does: sums by stage, of the feasible
+/// configurations.
+fn write_stages(
+    out: &mut String,
+    goal: &GoalReport,
+    budgets: &[(&ConfigurationReport, &ErrorBudget)],
+) -> std::fmt::Result {
+    let is_feasible = |each: &&(&ConfigurationReport, &ErrorBudget)| each.0.rejections.is_empty();
+    let range = |stage: &dyn Fn(&ErrorBudget) -> Option<Moments>| {
+        let values = budgets.iter().filter(is_feasible);
+        let values: Vec<f64> = values
+            .filter_map(|(_, budget)| Some(stage(budget)?.rms_m))
+            .collect();
+        let least_m = values.iter().copied().reduce(f64::min)?;
+        let most_m = values.iter().copied().reduce(f64::max)?;
+        Some(if mm(least_m) == mm(most_m) {
+            mm(most_m)
+        } else {
+            format!("{} to {}", mm(least_m), mm(most_m))
+        })
+    };
+    let stages = [
+        range(&|budget| budget.before_insertion),
+        range(&|budget| budget.in_tissue),
+        range(&|budget| budget.of_breath),
+    ];
+    if let [Some(before), Some(tissue), Some(breath)] = stages {
+        let play = if goal.needle.is_some() {
+            "needle with play"
+        } else {
+            "needle"
+        };
+        writeln!(
+            out,
+            "at the target, mm RMS: before insertion {before} | in tissue ({play}, indentation) {tissue} | breath {breath}"
+        )?;
+    }
+    Ok(())
 }
 
 /// The largest differences between Jacobians and draws over all sources: covariance in per cent, bias in um.

@@ -11,6 +11,7 @@ pub mod excitation;
 pub mod free;
 pub mod iso9283;
 pub(crate) mod judged;
+pub(crate) mod needle;
 pub mod overview;
 pub(crate) mod ranking;
 mod referee;

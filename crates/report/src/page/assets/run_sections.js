@@ -102,6 +102,10 @@ NB.sections = /** @type {RunSections} */ (
         parts.push(
           NB.el('p', { class: 'bad', text: `The needle crosses ${fissures.map(NB.words).join(', ')} of the lung.` }),
         );
+      if (goal.needle) {
+        const { summary } = goal.needle;
+        parts.push(NB.el('p', { text: `${summary.charAt(0).toUpperCase()}${summary.slice(1)}.` }));
+      }
       return parts;
     },
 

@@ -21,6 +21,7 @@ use super::budget::{ALLOWED_M, CLINICAL_LATERAL_M, CLINICAL_M, budget_text, budg
 use super::engine_headings::{EngineHeading, engine_headings};
 use super::events::events_text;
 use super::judged::judged_blocks;
+use super::needle::needle_blocks;
 use super::ranking::comparison_text;
 use super::shown::{Shown, shown_metrics};
 use super::true_target::true_target_in_words;
@@ -56,6 +57,10 @@ fn write_report(
         writeln!(out, "* worst of the feasible configurations, < recommended")?;
         write_constant(out, goal, &constant)?;
         write_expected(out, report, goal)?;
+        if let Some(needle) = &goal.needle {
+            writeln!(out, "{}", needle.summary)?;
+            out.push_str(&blocks_text(&needle_blocks(needle)));
+        }
         let mut checks = columns(&headings, |heading| heading.engines);
         checks.retain(|column| column.metric.says_something(goal));
         if goal

@@ -153,6 +153,9 @@ fn write_goal(
     if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
         writeln!(out, "{words}")?;
     }
+    if let Some(needle) = &goal.needle {
+        writeln!(out, "{}", needle.summary)?;
+    }
     if let Some(words) = true_target_in_words(goal) {
         writeln!(out, "{words}")?;
     }

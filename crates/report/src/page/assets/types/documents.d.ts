@@ -277,6 +277,7 @@ interface GoalReport {
     kept: boolean;
   } | null;
   fissures_crossed?: string[];
+  needle?: { summary: string };
   configurations: ConfigurationReport[];
 }
 

@@ -1,0 +1,402 @@
+//! How a goal's needle bends in tissue, and what can be done about it.
+
+use nalgebra::{Point3, Vector2, Vector3};
+use needlebench_evaluation::report::{
+    BendSummary, BevelDirection, NeedleAlternative, NeedleLayer, NeedleReport, TurnedNeedle,
+};
+use needlebench_insertion::{Gauge, Guide, Insertion, Point, Tissue, WARNED_SLOPE};
+use needlebench_numerics::order::quantile_position;
+use needlebench_planning::bent_route;
+use needlebench_scenario::imperfections::TissueNeedle;
+use needlebench_scenario::{Goal, NeedlePath, PlacedPhantom, ResolvedScenario};
+use needlebench_uncertainty::{DRAWS, drawn_bends_m};
+
+/// Draws that a search for the best depth of a turn takes: the answer is flat within 5 mm.
+const SEARCH_DRAWS: usize = 64;
+
+/// Depths of a turn that are tried, as shares of the way.
+const TURNS: std::ops::RangeInclusive<u32> = 4..=19;
+const TURN_STEPS: f64 = 20.0;
+
+/// Points of a bent needle that distances are measured between, m apart.
+const STEP_M: f64 = 5e-3;
+
+/// Longer guides and smaller stand-offs that are tried, m.
+const GUIDES_M: [f64; 2] = [30e-3, 80e-3];
+const STAND_OFFS_M: [f64; 4] = [5e-3, 10e-3, 20e-3, 40e-3];
+
+/// The needle of a goal; none for one that bends in air, or not at all.
+pub(crate) fn needle_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<NeedleReport> {
+    let expected = resolved.expected.as_ref()?;
+    let needle = expected.imperfections.tissue()?;
+    let (path, placed) = (goal.needle_path.as_deref()?, resolved.phantom.as_ref()?);
+    let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+    let medians = needle.medians();
+    let inserted = needle.insert(&medians, path, stand_off_m).ok()?;
+    let has_direction = needle.tip == Point::Bevel;
+    let towards = path.pushed_towards.filter(|_| has_direction);
+    let sizes_m = sizes_m(needle, goal, DRAWS);
+    let tool = &resolved.cell.tool;
+    let layers = path.layers.iter().map(|layer| {
+        let index = TissueNeedle::KINDS
+            .iter()
+            .position(|kind| *kind == layer.tissue);
+        let [stiffness_n_m2, force_n] = index.map_or([0.0; 2], |index| {
+            let force_n = medians.wall_force_n * needle.living * needle.tip.share();
+            let (stiffness, share) = (medians.stiffness_n_m2[index], medians.force_shares[index]);
+            let outer_m = needle.needle.outer_m;
+            let median = layer
+                .tissue
+                .layer_of(layer.length_m, outer_m, stiffness, force_n, share);
+            [median.stiffness_n_m2, median.force_n]
+        });
+        NeedleLayer {
+            tissue: layer.tissue.name(),
+            length_m: layer.length_m,
+            stiffness_n_m2,
+            force_n,
+        }
+    });
+    let to_patient =
+        placed.world_from_phantom.rotation.inverse() * goal.world_from_guide_exit.rotation;
+    let mut assumed = vec![
+        "stiffnesses of tissues",
+        "shares of the force in fat, lung and lesion",
+    ];
+    if !needle.is_force_measured {
+        assumed.insert(0, "force across the tip (from a 22 G in ballistic gel)");
+    }
+    let pushed_towards = towards.map(|[x, y]| to_patient * Vector3::new(x, y, 0.0));
+    let mut report = NeedleReport {
+        summary: String::new(),
+        gauge: tool.needle.gauge,
+        outer_diameter_m: needle.needle.outer_m,
+        bending_stiffness_nm2: needle.needle.bending_stiffness_nm2(),
+        tip: match needle.tip {
+            Point::Bevel => "bevel",
+            Point::Symmetric => "symmetric",
+            Point::Rolled => "rolled",
+        },
+        layers: layers.collect(),
+        pushed_towards: pushed_towards.map(Into::into),
+        bend: summary(&sizes_m),
+        bend_at_pleura_m: pleura_m(path).map(|depth_m| bend_at_m(&inserted, depth_m)),
+        largest_slope: inserted.largest_slope(),
+        path_m: sampled(&inserted),
+        turned: (has_direction && needle.turn_at_m.is_none()).then(|| turned(needle, goal, path)),
+        aimed_rms_m: towards.map(|_| aimed_rms_m(needle, &sizes_m)),
+        alternatives: alternatives(resolved, needle, goal),
+        faces: if has_direction {
+            faces(resolved, placed, goal, &inserted)
+        } else {
+            Vec::new()
+        },
+        assumed,
+    };
+    report.summary = summary_of(&report, needle, pushed_towards);
+    Some(report)
+}
+
+/// The answer: how far it bends, to which side, and what helps.
+fn summary_of(
+    report: &NeedleReport,
+    needle: &TissueNeedle,
+    towards: Option<Vector3<f64>>,
+) -> String {
+    let mm = |metres: f64| format!("{:.1}", metres * 1e3);
+    let stylet = if needle.needle.has_stylet {
+        "stylet in"
+    } else {
+        "stylet out"
+    };
+    let BendSummary {
+        median_m,
+        p05_m,
+        p95_m,
+        rms_m,
+    } = report.bend;
+    let side = match towards {
+        Some(towards) if median_m >= 0.0 => format!("towards the patient's {}", side_of(&towards)),
+        Some(towards) => format!("towards the patient's {}", side_of(&-towards)),
+        None => "to a side that is not known".to_owned(),
+    };
+    let (least_m, most_m) = if median_m >= 0.0 {
+        (p05_m, p95_m)
+    } else {
+        (-p95_m, -p05_m)
+    };
+    let mut text = format!(
+        "needle {} G, {}, {stylet}: bends {} mm {side} (90 % of needles {} to {})",
+        report.gauge,
+        report.tip,
+        mm(median_m.abs()),
+        mm(least_m),
+        mm(most_m)
+    );
+    if let Some(before_m) = report.bend_at_pleura_m {
+        text.push_str(&format!(
+            ", {} mm of it before the lung",
+            mm(before_m.abs())
+        ));
+    }
+    if let Some(turned) = report.turned {
+        text.push_str(&format!(
+            "; turned by 180 deg at {:.0} mm: RMS {} instead of {} mm",
+            turned.at_m * 1e3,
+            mm(turned.rms_m),
+            mm(rms_m)
+        ));
+    }
+    if let Some(aimed_m) = report.aimed_rms_m {
+        text.push_str(&format!("; aimed against it: RMS {} mm", mm(aimed_m)));
+    }
+    if report.largest_slope > WARNED_SLOPE {
+        text.push_str("; it bends more than its model is for: a rough figure");
+    }
+    text
+}
+
+/// Sides of a patient along the axes of the phantom frame, forwards and backwards.
+const SIDES: [[&str; 2]; 3] = [["left", "right"], ["back", "front"], ["head", "feet"]];
+
+/// Least part of a direction, as a share of the whole, that a second side is named for.
+const NAMED: f64 = 0.4;
+
+fn side_of(towards: &Vector3<f64>) -> String {
+    let mut parts: Vec<(f64, &str)> = SIDES
+        .iter()
+        .zip(towards.iter())
+        .map(|([ahead, behind], along)| (along.abs(), if *along > 0.0 { *ahead } else { *behind }))
+        .collect();
+    parts.sort_by(|a, b| b.0.total_cmp(&a.0));
+    match parts.as_slice() {
+        [(_, first), (second, name), ..] if *second > NAMED => format!("{first} and {name}"),
+        [(_, first), ..] => (*first).to_owned(),
+        [] => String::new(),
+    }
+}
+
+fn sizes_m(needle: &TissueNeedle, goal: &Goal, draws: usize) -> Vec<f64> {
+    let drawn_m = drawn_bends_m(needle, goal, draws).into_iter();
+    drawn_m.map(|[_, at_tip_m]| at_tip_m).collect()
+}
+
+fn rms_m(sizes_m: &[f64]) -> f64 {
+    (sizes_m.iter().map(|size| size * size).sum::<f64>() / sizes_m.len() as f64).sqrt()
+}
+
+fn summary(sizes_m: &[f64]) -> BendSummary {
+    let mut sorted = sizes_m.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let quantile = |share: f64| {
+        let (index, between) = quantile_position(sorted.len() as u64, share);
+        let index = usize::try_from(index).unwrap_or(0);
+        let next = (index + 1).min(sorted.len() - 1);
+        sorted[index] * (1.0 - between) + sorted[next] * between
+    };
+    let [p05_m, median_m, p95_m] = [0.05, 0.5, 0.95].map(quantile);
+    BendSummary {
+        median_m,
+        p05_m,
+        p95_m,
+        rms_m: rms_m(sizes_m),
+    }
+}
+
+/// What is left of the bends once the axis is aimed against their mean, m.
+fn aimed_rms_m(needle: &TissueNeedle, sizes_m: &[f64]) -> f64 {
+    let mean_m = sizes_m.iter().sum::<f64>() / sizes_m.len() as f64;
+    // The mean of a direction that is normal about the known one is shorter than 1.
+    let aimed_m = mean_m * libm::exp(-0.5 * needle.bevel_spread_rad * needle.bevel_spread_rad);
+    let square_m2 = rms_m(sizes_m) * rms_m(sizes_m);
+    (square_m2 - aimed_m * aimed_m).max(0.0).sqrt()
+}
+
+/// Depth at which a needle first enters a lung, m.
+fn pleura_m(path: &NeedlePath) -> Option<f64> {
+    let lung = path
+        .layers
+        .iter()
+        .position(|layer| layer.tissue == Tissue::Lung)?;
+    Some(path.layers[..lung].iter().map(|layer| layer.length_m).sum())
+}
+
+/// How far what a needle has cut is off the axis at a depth, m.
+fn bend_at_m(inserted: &Insertion, depth_m: f64) -> f64 {
+    let depths_m = &inserted.depths_m;
+    let next = depths_m
+        .partition_point(|&each| each < depth_m)
+        .clamp(1, depths_m.len() - 1);
+    let [from_m, to_m] = [depths_m[next - 1], depths_m[next]];
+    let share = ((depth_m - from_m) / (to_m - from_m)).clamp(0.0, 1.0);
+    inserted.path_m[next - 1][0] * (1.0 - share) + inserted.path_m[next][0] * share
+}
+
+/// Depths and bends at steps of a few millimetres.
+fn sampled(inserted: &Insertion) -> Vec<[f64; 2]> {
+    let end_m = inserted.depths_m.last().copied().unwrap_or(0.0);
+    let count = (end_m / STEP_M).ceil().max(1.0);
+    let mut points = Vec::new();
+    let mut number = 0.0;
+    while number <= count {
+        let depth_m = end_m * number / count;
+        points.push([depth_m, bend_at_m(inserted, depth_m)]);
+        number += 1.0;
+    }
+    points
+}
+
+/// The turn that leaves the least.
+fn turned(needle: &TissueNeedle, goal: &Goal, path: &NeedlePath) -> TurnedNeedle {
+    let depth_m: f64 = path.layers.iter().map(|layer| layer.length_m).sum();
+    let turned_at = |at_m: f64| TissueNeedle {
+        turn_at_m: Some(at_m),
+        ..needle.clone()
+    };
+    let tried = TURNS.map(|step| {
+        let at_m = depth_m * f64::from(step) / TURN_STEPS;
+        (at_m, rms_m(&sizes_m(&turned_at(at_m), goal, SEARCH_DRAWS)))
+    });
+    let best = tried.min_by(|a, b| a.1.total_cmp(&b.1));
+    let (at_m, _) = best.expect("some depths are tried");
+    TurnedNeedle {
+        at_m,
+        rms_m: rms_m(&sizes_m(&turned_at(at_m), goal, DRAWS)),
+    }
+}
+
+/// Other needles in the same guide, other tips, stand-offs and guides.
+fn alternatives(
+    resolved: &ResolvedScenario,
+    needle: &TissueNeedle,
+    goal: &Goal,
+) -> Vec<NeedleAlternative> {
+    let tool = &resolved.cell.tool;
+    let has_play = needle.guide.play_m > 0.0;
+    let play_m = |outer_m: f64| {
+        if has_play {
+            0.5 * (tool.bore_m - outer_m)
+        } else {
+            0.0
+        }
+    };
+    let mut all = Vec::new();
+    let mut add = |what: String, needle: &TissueNeedle, goal: &Goal| {
+        let bend = summary(&sizes_m(needle, goal, DRAWS));
+        all.push(NeedleAlternative { what, bend });
+    };
+    let gauges = Gauge::ALL.into_iter().filter(|gauge| {
+        let [outer_m, _] = gauge.diameters_m();
+        u32::from(gauge.number()) != tool.needle.gauge && outer_m < tool.bore_m
+    });
+    for gauge in gauges {
+        let [outer_m, inner_m] = gauge.diameters_m();
+        let mut other = needle.clone();
+        other.needle.outer_m = outer_m;
+        other.needle.inner_m = if needle.needle.has_stylet {
+            0.0
+        } else {
+            inner_m
+        };
+        other.guide.play_m = play_m(outer_m).min(1e-3);
+        add(format!("{} G in this guide", gauge.number()), &other, goal);
+        if has_play {
+            other.guide.play_m = needle.guide.play_m;
+            add(
+                format!("{} G in a guide that fits as well", gauge.number()),
+                &other,
+                goal,
+            );
+        }
+    }
+    for (tip, what) in [
+        (Point::Bevel, "bevelled tip"),
+        (Point::Symmetric, "symmetric tip"),
+        (Point::Rolled, "bevel rolled on the way"),
+    ] {
+        if tip != needle.tip {
+            let other = TissueNeedle {
+                tip,
+                turn_at_m: None,
+                ..needle.clone()
+            };
+            add(what.to_owned(), &other, goal);
+        }
+    }
+    let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+    for other_m in STAND_OFFS_M
+        .into_iter()
+        .filter(|each| (each - stand_off_m).abs() > 1e-6)
+    {
+        let nearer = Goal {
+            standoff_m: Some(other_m),
+            ..goal.clone()
+        };
+        add(
+            format!("stand-off {:.0} mm", other_m * 1e3),
+            needle,
+            &nearer,
+        );
+    }
+    for length_m in GUIDES_M
+        .into_iter()
+        .filter(|each| (each - needle.guide.length_m).abs() > 1e-6)
+    {
+        let other = TissueNeedle {
+            guide: Guide {
+                length_m,
+                ..needle.guide
+            },
+            ..needle.clone()
+        };
+        add(format!("guide {:.0} mm long", length_m * 1e3), &other, goal);
+    }
+    all
+}
+
+/// What a needle that is bent as the medians have it keeps away from, for twelve directions of its bevel's face.
+fn faces(
+    resolved: &ResolvedScenario,
+    placed: &PlacedPhantom,
+    goal: &Goal,
+    inserted: &Insertion,
+) -> Vec<BevelDirection> {
+    let Some(entry) = goal.entry_m else {
+        return Vec::new();
+    };
+    let path_m = sampled(inserted);
+    let to_patient =
+        placed.world_from_phantom.rotation.inverse() * goal.world_from_guide_exit.rotation;
+    // Twelve o'clock and three o'clock across the guide's exit at roll 0.
+    let axis = to_patient * Vector3::z();
+    let head = if axis.z.abs() < 0.99 {
+        Vector3::z()
+    } else {
+        Vector3::x()
+    };
+    let twelve = to_patient.inverse() * (head - axis * axis.dot(&head)).normalize();
+    let twelve = Vector2::new(twelve.x, twelve.y);
+    let three = Vector2::new(-twelve.y, twelve.x);
+    let mut found: Vec<BevelDirection> = (1..=12_u32)
+        .filter_map(|hour| {
+            let (sine, cosine) = libm::sincos(f64::from(hour) * std::f64::consts::TAU / 12.0);
+            let towards = -(twelve * cosine + three * sine);
+            let across =
+                goal.world_from_guide_exit.rotation * Vector3::new(towards.x, towards.y, 0.0);
+            let points: Vec<Point3<f64>> = path_m
+                .iter()
+                .map(|[depth_m, bend_m]| {
+                    entry + goal.axis.into_inner() * *depth_m + across * *bend_m
+                })
+                .collect();
+            let nearest = bent_route(&resolved.cell, placed, goal, &points)?;
+            Some(BevelDirection {
+                clock: format!("{hour}:00"),
+                part: nearest.part.name.clone(),
+                distance_m: nearest.separation.distance_m,
+            })
+        })
+        .collect();
+    found.sort_by(|a, b| b.distance_m.total_cmp(&a.distance_m));
+    found
+}

@@ -1,0 +1,75 @@
+//! How a needle bends in tissue: a sentence, and what can be done about it.
+
+use needlebench_evaluation::report::{BendSummary, NeedleReport};
+use needlebench_show::Block;
+
+/// Alternatives that the needle is compared with, and what its bevel may face.
+pub(crate) fn needle_blocks(needle: &NeedleReport) -> Vec<Block> {
+    let one = |metres: f64| format!("{:.1}", metres * 1e3);
+    let layers = needle.layers.iter().map(|layer| {
+        vec![
+            layer.tissue.to_owned(),
+            one(layer.length_m),
+            format!("{:.1}", layer.stiffness_n_m2 * 1e-3),
+            format!("{:.3}", layer.force_n),
+        ]
+    });
+    let row = |what: &str, bend: &BendSummary| {
+        vec![
+            what.to_owned(),
+            one(bend.median_m),
+            format!("{} to {}", one(bend.p05_m), one(bend.p95_m)),
+            one(bend.rms_m),
+        ]
+    };
+    let own = [row("as planned", &needle.bend)];
+    let rms_alone =
+        |what: String, rms_m: f64| vec![what, "-".to_owned(), "-".to_owned(), one(rms_m)];
+    let turned = needle.turned.map(|turned| {
+        let what = format!("turned by 180 deg at {:.0} mm", turned.at_m * 1e3);
+        rms_alone(what, turned.rms_m)
+    });
+    let aimed = needle
+        .aimed_rms_m
+        .map(|rms_m| rms_alone("aimed against the mean bend".to_owned(), rms_m));
+    let others = needle
+        .alternatives
+        .iter()
+        .map(|each| row(&each.what, &each.bend));
+    let mut blocks = vec![
+        Block::table(
+            [
+                "layer",
+                "length (mm)",
+                "stiffness (kN/m2)",
+                "force across the tip (N)",
+            ],
+            layers.collect(),
+        ),
+        Block::table(
+            ["needle", "median bend (mm)", "90 % of needles", "RMS"],
+            own.into_iter()
+                .chain(turned)
+                .chain(aimed)
+                .chain(others)
+                .collect(),
+        ),
+    ];
+    if let (Some(best), Some(worst)) = (needle.faces.first(), needle.faces.last()) {
+        blocks.push(Block::Lines(vec![format!(
+            "bevel facing {}: the bent needle keeps {} mm from {}; facing {}: {} mm from {} (12:00 towards the head, seen \
+             from the hub)",
+            best.clock,
+            one(best.distance_m),
+            best.part,
+            worst.clock,
+            one(worst.distance_m),
+            worst.part,
+        )]));
+    }
+    blocks.push(Block::Lines(vec![format!(
+        "assumed: {}",
+        needle.assumed.join("; ")
+    )]));
+    blocks
+}
