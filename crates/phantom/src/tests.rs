@@ -685,3 +685,70 @@ fn a_body_that_is_assumed_goes_on_from_where_it_ends() {
     }
     assert!(!cut.is_skin_seen(&Point3::new(0.0, 0.0, half_m)));
 }
+
+/// Against the solids that hold each tenth of a millimetre of the way.
+#[test]
+fn layers_of_a_needle_are_the_solids_that_it_passes() {
+    let phantom = Phantom::build(&Phantom::size_preset("male-p50-supine").unwrap()).unwrap();
+    let is_in = |at: &Point3<f64>, wanted: &dyn Fn(&PhantomPart) -> bool| {
+        phantom
+            .parts
+            .iter()
+            .any(|part| wanted(part) && part.solid.contains(at))
+    };
+    let (mut passed, mut refused) = (0, 0);
+    for lesion in &phantom.lesions {
+        for step in 0..24 {
+            let angle = f64::from(step) * TAU / 24.0;
+            let (sine, cosine) = libm::sincos(angle);
+            let outwards = UnitVector3::new_normalize(Vector3::new(cosine, sine, 0.1));
+            let (_, leaves_m) = phantom
+                .skin_intersection(&lesion.center_m, &outwards)
+                .unwrap();
+            let entry = lesion.center_m + outwards.into_inner() * leaves_m;
+            let at = |share: f64| entry + (lesion.center_m - entry) * share;
+            let is_bone = |part: &PhantomPart| part.tissue == Tissue::Bone;
+            let meets_bone = (0..=1000).any(|k| is_in(&at(f64::from(k) / 1000.0), &is_bone));
+            let layers = match phantom.layers(&entry, &lesion.center_m) {
+                Ok(layers) => layers,
+                Err(LayersError::Bone(_)) => {
+                    refused += 1;
+                    continue;
+                }
+            };
+            assert!(!meets_bone);
+            passed += 1;
+            assert_eq!(layers[0].tissue, Passed::Fat);
+            let length_m: f64 = layers.iter().map(|layer| layer.length_m).sum();
+            assert!((length_m - leaves_m).abs() < ROUNDING_M);
+            for k in 0..1000 {
+                let share = (f64::from(k) + 0.5) / 1000.0;
+                let mut end_m = 0.0;
+                let layer = layers.iter().find(|layer| {
+                    end_m += layer.length_m;
+                    end_m > share * length_m
+                });
+                let begin_m = end_m - layer.unwrap().length_m;
+                let from_end_m = (end_m - share * length_m).min(share * length_m - begin_m);
+                if from_end_m < 1.1e-3 {
+                    // Short stretches are those beside them.
+                    continue;
+                }
+                let is_lesion = |part: &PhantomPart| part.tissue == Tissue::Lesion;
+                let is_lung = |part: &PhantomPart| {
+                    part.tissue == Tissue::Organ && part.name.starts_with("lung_")
+                };
+                let wanted = if is_in(&at(share), &is_lesion) {
+                    Passed::Lesion
+                } else if is_in(&at(share), &is_lung) {
+                    Passed::Lung
+                } else {
+                    Passed::Wall
+                };
+                let found = layer.unwrap().tissue;
+                assert!(found == wanted || (found, wanted) == (Passed::Fat, Passed::Wall));
+            }
+        }
+    }
+    assert!(passed > 20 && refused > 20, "{passed} {refused}");
+}

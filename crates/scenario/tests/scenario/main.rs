@@ -13,6 +13,7 @@ mod layouts;
 mod limbs;
 mod measured;
 mod moves;
+mod needle;
 mod obstacles;
 mod pair_classes;
 mod people;

@@ -3,4 +3,5 @@
 mod budget;
 mod common;
 mod settled;
+mod tissue;
 mod true_target;

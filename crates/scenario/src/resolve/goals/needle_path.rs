@@ -22,7 +22,7 @@ pub struct NeedlePath {
 }
 
 /// Least sine of the angle between a needle and a direction that its bevel is to face.
-const LEAST_SINE: f64 = 0.2;
+const LEAST_SINE: f64 = 0.3;
 
 /// The way of a goal's needle through a phantom; the goal is in the frame that `to_phantom` is from.
 pub(super) fn needle_path(
