@@ -82,12 +82,16 @@ pub(crate) fn needle_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<
         bend: summary(&sizes_m),
         bend_at_pleura_m: pleura_m(path).map(|depth_m| bend_at_m(&inserted, depth_m)),
         largest_slope: inserted.largest_slope(),
+        path_in_world_m: towards.map_or_else(Vec::new, |[x, y]| {
+            let points = in_world(goal, &sampled(&inserted), &Vector2::new(x, y)).into_iter();
+            points.map(|point| point.coords.into()).collect()
+        }),
         path_m: sampled(&inserted),
         turned: (has_direction && needle.turn_at_m.is_none()).then(|| turned(needle, goal, path)),
         aimed_rms_m: towards.map(|_| aimed_rms_m(needle, &sizes_m)),
         alternatives: alternatives(resolved, needle, goal),
         faces: if has_direction {
-            faces(resolved, placed, goal, &inserted)
+            faces(resolved, placed, goal, path, &inserted)
         } else {
             Vec::new()
         },
@@ -354,41 +358,30 @@ fn alternatives(
     all
 }
 
+/// Points of a path, depths and bends, that is bent towards a direction across the guide's exit; world.
+fn in_world(goal: &Goal, path_m: &[[f64; 2]], towards: &Vector2<f64>) -> Vec<Point3<f64>> {
+    let entry = goal.entry_m.unwrap_or(goal.target_m);
+    let across = goal.world_from_guide_exit.rotation * Vector3::new(towards.x, towards.y, 0.0);
+    let at =
+        |[depth_m, bend_m]: &[f64; 2]| entry + goal.axis.into_inner() * *depth_m + across * *bend_m;
+    path_m.iter().map(at).collect()
+}
+
 /// What a needle that is bent as the medians have it keeps away from, for twelve directions of its bevel's face.
 fn faces(
     resolved: &ResolvedScenario,
     placed: &PlacedPhantom,
     goal: &Goal,
+    path: &NeedlePath,
     inserted: &Insertion,
 ) -> Vec<BevelDirection> {
-    let Some(entry) = goal.entry_m else {
-        return Vec::new();
-    };
     let path_m = sampled(inserted);
-    let to_patient =
-        placed.world_from_phantom.rotation.inverse() * goal.world_from_guide_exit.rotation;
-    // Twelve o'clock and three o'clock across the guide's exit at roll 0.
-    let axis = to_patient * Vector3::z();
-    let head = if axis.z.abs() < 0.99 {
-        Vector3::z()
-    } else {
-        Vector3::x()
-    };
-    let twelve = to_patient.inverse() * (head - axis * axis.dot(&head)).normalize();
-    let twelve = Vector2::new(twelve.x, twelve.y);
-    let three = Vector2::new(-twelve.y, twelve.x);
+    let [twelve, three] = path.clock.map(Vector2::from);
     let mut found: Vec<BevelDirection> = (1..=12_u32)
         .filter_map(|hour| {
             let (sine, cosine) = libm::sincos(f64::from(hour) * std::f64::consts::TAU / 12.0);
             let towards = -(twelve * cosine + three * sine);
-            let across =
-                goal.world_from_guide_exit.rotation * Vector3::new(towards.x, towards.y, 0.0);
-            let points: Vec<Point3<f64>> = path_m
-                .iter()
-                .map(|[depth_m, bend_m]| {
-                    entry + goal.axis.into_inner() * *depth_m + across * *bend_m
-                })
-                .collect();
+            let points = in_world(goal, &path_m, &towards);
             let nearest = bent_route(&resolved.cell, placed, goal, &points)?;
             Some(BevelDirection {
                 clock: format!("{hour}:00"),

@@ -191,6 +191,8 @@ pub struct NeedleReport {
     pub largest_slope: f64,
     /// What the needle cuts by medians: depth behind the skin and how far the path is off the axis there.
     pub path_m: Vec<[f64; 2]>,
+    /// Points of that path in the world, from the skin to the tip; none where its direction is not known.
+    pub path_in_world_m: Vec<[f64; 3]>,
     /// Turned by 180 degrees at the depth where that helps most; none for a tip without a direction, and for a needle that is
     /// turned as it is.
     pub turned: Option<TurnedNeedle>,

@@ -433,6 +433,10 @@ class RunPage {
     const [x, y, z] = this.extra.guideExit;
     const behind = [x - axis[0] * tool * 0.6, y - axis[1] * tool * 0.6, z - axis[2] * tool * 0.6];
     view.rod('needle', behind, target, 0.0012, [0, 0.45, 0.32, 1]);
+    // What tissue makes of it: the median needle.
+    const bent = this.goal.needle?.path_in_world_m ?? [];
+    bent.slice(1).forEach((point, at) => view.rod('needle', bent[at], point, 0.0009, [0.8, 0.1, 0.1, 1], true));
+    if (bent.length) view.label('needle', 'bent', bent[bent.length - 1]);
     view.ball('needle', target, 0.004, [0.84, 0.37, 0, 1]);
     view.label('needle', 'target', target);
     if (entry) {

@@ -19,6 +19,9 @@ pub struct NeedlePath {
     /// Unit vector across the needle towards which a bevelled tip is pushed, away from its face: x and y of the guide's
     /// exit at roll 0. None where the direction is not known.
     pub pushed_towards: Option<[f64; 2]>,
+    /// Twelve and three on the clock at the hub, of the same: towards the patient's head as near as the needle lets, and a
+    /// quarter further as seen along the insertion.
+    pub clock: [[f64; 2]; 2],
 }
 
 /// Least sine of the angle between a needle and a direction that its bevel is to face.
@@ -61,7 +64,7 @@ pub(super) fn needle_path(
         let finding = text.finding(&format!("{place}.turn_at_mm"), message);
         return Err(finding.hint("a depth between skin and tip"));
     }
-    // Whatever the frame of the goal: towards the head and, clockwise as seen along the insertion, a quarter on.
+    // Whatever the frame of the goal.
     let axis = (tip - entry).normalize();
     let head = if axis.z.abs() < 0.99 {
         Vector3::z()
@@ -69,12 +72,17 @@ pub(super) fn needle_path(
         Vector3::x()
     };
     let across = |direction: &Vector3<f64>| direction - axis * axis.dot(direction);
+    let twelve = across(&head).normalize();
+    let three = axis.cross(&twelve);
+    let to_guide = (to_phantom.rotation * goal.world_from_guide_exit.rotation).inverse();
+    let in_guide = |direction: Vector3<f64>| {
+        let turned = to_guide * direction;
+        [turned.x, turned.y]
+    };
     let key = format!("{place}.bevel");
     let faced = match block.face() {
         BevelFace::Unknown => None,
         BevelFace::Clock(angle_rad) => {
-            let twelve = across(&head).normalize();
-            let three = axis.cross(&twelve);
             let (sine, cosine) = libm::sincos(angle_rad);
             Some(twelve * cosine + three * sine)
         }
@@ -94,8 +102,7 @@ pub(super) fn needle_path(
                     |near| format!("did you mean `{near}`?"),
                 ))
             })?;
-            let towards = middle - entry;
-            Some(towards - axis * axis.dot(&towards)).filter(|off| off.norm() > 0.0)
+            Some(middle - entry)
         }
     };
     let pushed_towards = faced
@@ -111,14 +118,13 @@ pub(super) fn needle_path(
                     finding.hint("choose a direction across the needle, or a time such as `3:00`")
                 );
             }
-            let in_guide = (to_phantom.rotation * goal.world_from_guide_exit.rotation).inverse()
-                * -off.normalize();
-            Ok([in_guide.x, in_guide.y])
+            Ok(in_guide(-off.normalize()))
         })
         .transpose()?;
     Ok(NeedlePath {
         layers,
         pushed_towards,
+        clock: [twelve, three].map(in_guide),
     })
 }
 

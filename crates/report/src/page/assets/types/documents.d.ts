@@ -277,7 +277,7 @@ interface GoalReport {
     kept: boolean;
   } | null;
   fissures_crossed?: string[];
-  needle?: { summary: string };
+  needle?: { summary: string; path_in_world_m: Point[] };
   configurations: ConfigurationReport[];
 }
 
