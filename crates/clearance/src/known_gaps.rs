@@ -9,12 +9,12 @@
 
 use std::cell::OnceCell;
 
-use needlebench_cell::{ClearanceClass, Frame};
+use needlebench_cell::ClearanceClass;
 use needlebench_geometry::Placement;
 use needlebench_kinematics::{Joints, Pose};
 
 use crate::body::LinkPlacements;
-use crate::model::{ClearanceModel, PlacedPair};
+use crate::model::ClearanceModel;
 use crate::posture::Posture;
 use crate::search::after_travel;
 
@@ -72,20 +72,6 @@ impl<'m> View<'m> {
         }
     }
 
-    /// Place of a pair's body A beside its body B.
-    fn b_from_a(&self, pair: &PlacedPair) -> Placement {
-        let place = |body: usize| match self.model.bodies[body].frame {
-            Frame::World => None,
-            Frame::Link(link) => Some(&self.links[link]),
-        };
-        match (place(pair.a), place(pair.b)) {
-            (Some(a), Some(b)) => b.inverse_after(a),
-            (Some(a), None) => *a,
-            (None, Some(b)) => b.inverse_after(&Placement::IDENTITY),
-            (None, None) => Placement::IDENTITY,
-        }
-    }
-
     fn gap_m(&self, pair: usize) -> f64 {
         let posture = || Posture::new(&self.model.bodies, self.links);
         let posture = self.posture.get_or_init(posture);
@@ -128,7 +114,7 @@ impl<'m> KnownGaps<'m> {
         let mut open: Vec<(usize, Placement)> = Vec::new();
         for (index, watched) in self.watched.iter().enumerate() {
             let pair = &model.pairs[watched.pair];
-            let b_from_a = views[usize::from(watched.of_patient)].b_from_a(pair);
+            let b_from_a = model.b_from_a(pair, views[usize::from(watched.of_patient)].links);
             match watched.by_travel(model, &b_from_a) {
                 Some(true) => {}
                 Some(false) => return Some(false),

@@ -29,4 +29,4 @@ pub use model::{
     CUT_MARGIN_M, ClassMinima, ClearanceModel, ClearanceParts, PairClearance, is_known,
 };
 pub use pairs::{PairConcern, PairExamination, PairSettings, PairState, RangeBound, examine_pairs};
-pub use search::{AIMS, Counted, Counts, Nearby};
+pub use search::{AIMS, Counted, Counts, Couple, Held, Nearby};

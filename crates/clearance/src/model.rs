@@ -327,6 +327,20 @@ impl ClearanceModel {
         })
     }
 
+    /// Place of a pair's body A beside its body B.
+    pub(crate) fn b_from_a(&self, pair: &PlacedPair, links: &LinkPlacements) -> Placement {
+        let place = |body: usize| match self.bodies[body].frame {
+            Frame::World => None,
+            Frame::Link(link) => Some(&links[link]),
+        };
+        match (place(pair.a), place(pair.b)) {
+            (Some(a), Some(b)) => b.inverse_after(a),
+            (Some(a), None) => *a,
+            (None, Some(b)) => b.inverse_after(&Placement::IDENTITY),
+            (None, None) => Placement::IDENTITY,
+        }
+    }
+
     pub(crate) fn world_from_links(&self, q: &Joints) -> [Pose; JOINT_COUNT] {
         self.chain
             .link_poses(q)

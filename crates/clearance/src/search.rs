@@ -23,7 +23,7 @@ use needlebench_geometry::{
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
 
 use crate::body::{LinkPlacements, PlacedBody, Seen};
-use crate::model::{CLASS_COUNT, ClassMinima, ClearanceModel, PairClearance, PlacedPair};
+use crate::model::{CLASS_COUNT, ClassMinima, ClearanceModel, PairClearance};
 use crate::posture::Posture;
 
 impl ClearanceModel {
@@ -68,18 +68,23 @@ impl ClearanceModel {
         self.with_behind_cuts(least.minima(&look), &world_from_links)
     }
 
+    /// Where a posture holds the arm's links.
+    pub fn held(&self, q: &Joints) -> Held {
+        Held(self.world_from_links(q).each_ref().map(Placement::new))
+    }
+
     /// Least clearances as far as they count, and no farther; of postures that follow each other, as
     /// [`ClearanceModel::minimum_per_class_near`].
-    pub fn what_counts_near(&self, q: &Joints, nearby: &mut Nearby, counts: &Counts) -> Counted {
-        let links = self.world_from_links(q).each_ref().map(Placement::new);
+    pub fn what_counts_near(&self, held: &Held, nearby: &mut Nearby, counts: &Counts) -> Counted {
         let look = Look {
             model: self,
-            links: &links,
+            links: &held.0,
         };
         let mut counting = Counting {
             counts,
             found: Counted {
                 by_class_m: [f64::INFINITY; CLASS_COUNT],
+                couple_of_class: [None; CLASS_COUNT],
                 aim_m: counts.aim_cap_m,
                 excess_m: counts.excess_cap_m,
                 excess_of: None,
@@ -114,16 +119,18 @@ impl ClearanceModel {
         Some(look.clearance(couple, &separation))
     }
 
-    /// Most that the clearance of a pair differs between two postures, m: what its two bodies have
-    /// travelled from one to the other.
-    pub fn travel_m(&self, pair: usize, from: &Joints, to: &Joints) -> f64 {
-        let [from, to] =
-            [from, to].map(|q| self.world_from_links(q).each_ref().map(Placement::new));
-        let PlacedPair { a, b, .. } = self.pairs[pair];
-        [a, b]
-            .map(|body| travel_m(&self.bodies[body], &from, &to))
-            .iter()
-            .sum()
+    /// Most that the distance of two solids differs between two postures, m: how far the one of the arm moves beside the
+    /// other from one to the other.
+    pub fn travel_m(&self, couple: Couple, from: &Held, to: &Held) -> f64 {
+        let pair = &self.pairs[couple.pair];
+        let bound = &self.bodies[pair.a].solids[couple.a].bound;
+        let [from, to] = [from, to].map(|held| self.b_from_a(pair, &held.0));
+        // Of the ball and of a capsule's axis the ends move farthest, and what is around them turns with them.
+        let ends = [1.0, -1.0].map(|side| {
+            let end = bound.centre + bound.half_axis * side;
+            from.travel_m(&to, &end, bound.radius_m)
+        });
+        ends[0].max(ends[1])
     }
 
     /// A pair that is closer than the limit of its class, m, if there is any; of postures that follow
@@ -173,11 +180,18 @@ impl ClearanceModel {
     }
 }
 
-/// Two solids of a pair: indices of the pair and of the solids of its bodies.
+/// The arm's links where a posture holds them, for a model that is asked several things about it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held(LinkPlacements);
+
+/// Two solids of a pair of bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Couple {
+pub struct Couple {
+    /// The pair, an index into [`Cell::pairs`](needlebench_cell::Cell::pairs).
     pub pair: usize,
+    /// Solid of its first body.
     pub a: usize,
+    /// Solid of its second body.
     pub b: usize,
 }
 
@@ -601,14 +615,15 @@ pub struct Counts {
 pub struct Counted {
     /// By class: the least clearance where it is below the class's cap, else something not below it, m.
     pub by_class_m: [f64; CLASS_COUNT],
+    /// The solids whose distances these are.
+    pub couple_of_class: [Option<Couple>; CLASS_COUNT],
     /// By group: the least clearance, or the cap where that is less, m.
     pub aim_m: [f64; AIMS],
     /// The least excess over a floor, or the cap where that is less, m. Where it is negative it alone is right; where it is
     /// below [`Counts::ends_below_m`] it is only known that the least one is, and the value may be any such.
     pub excess_m: f64,
-    /// The pair whose excess it is, an index into [`Cell::pairs`](needlebench_cell::Cell::pairs), unless it is
-    /// the cap.
-    pub excess_of: Option<usize>,
+    /// The solids whose excess it is, unless it is the cap.
+    pub excess_of: Option<Couple>,
 }
 
 impl Counts {
@@ -653,15 +668,18 @@ impl Wanted for Counting<'_> {
         } else {
             found.distance_m
         };
-        let least = |known_m: &mut f64, here_m: f64| *known_m = known_m.min(here_m);
-        least(&mut self.found.by_class_m[class], distance_m);
+        if distance_m < self.found.by_class_m[class] {
+            self.found.by_class_m[class] = distance_m;
+            self.found.couple_of_class[class] = Some(couple);
+        }
         if let Some(aim) = counts.aim_of[class] {
-            least(&mut self.found.aim_m[aim], distance_m);
+            let known_m = &mut self.found.aim_m[aim];
+            *known_m = known_m.min(distance_m);
         }
         let excess_m = distance_m - counts.floor_m[class];
         if counts.floor_m[class] > f64::NEG_INFINITY && excess_m < self.found.excess_m {
             self.found.excess_m = excess_m;
-            self.found.excess_of = Some(couple.pair);
+            self.found.excess_of = Some(couple);
         }
         self.found.excess_m >= counts.ends_below_m
     }
@@ -673,7 +691,7 @@ impl Wanted for Counting<'_> {
 
     fn end(&mut self, couple: Couple) {
         self.found.excess_m = f64::NEG_INFINITY;
-        self.found.excess_of = Some(couple.pair);
+        self.found.excess_of = Some(couple);
     }
 }
 

@@ -102,19 +102,13 @@ pub fn separation_between(
 /// Whether the signed distance is less than a limit, or is not a number: what [`separation_within`] says, without the
 /// depth where shapes penetrate and any gap would do.
 pub fn is_nearer(a: &PreparedShape, b: &PreparedShape, b_from_a: &Placement, limit_m: f64) -> bool {
-    let is_below = |distance_m: f64| distance_m < limit_m || distance_m.is_nan();
-    if limit_m <= 0.0 {
-        let found = separation_within(a, b, b_from_a, limit_m);
-        return found.is_some_and(|found| is_below(found.distance_m));
-    }
-    if a.is_surface() || b.is_surface() {
+    if limit_m > 0.0 && (a.is_surface() || b.is_surface()) {
         return surface::is_nearer(a, b, b_from_a, limit_m);
     }
-    let radius_m = a.radius_m + b.radius_m;
-    match core_gap(a, b, b_from_a, limit_m + radius_m) {
-        Gap::Apart(core) => is_below(core.distance_m - radius_m),
-        Gap::BeyondCutoff => false,
-        Gap::Overlap => true,
+    match separation_between(a, b, b_from_a, limit_m, limit_m) {
+        Between::BeyondCutoff => false,
+        Between::Below => true,
+        Between::Found(found) => found.distance_m < limit_m || found.distance_m.is_nan(),
     }
 }
 

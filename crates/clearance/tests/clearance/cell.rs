@@ -189,7 +189,8 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
             assert_eq!(minima.iter().count(), 8);
             minima.iter().for_each(check);
             // As far as it counts.
-            let asked = |nearby: &mut Nearby| model.what_counts_near(&q, nearby, &counts);
+            let asked =
+                |nearby: &mut Nearby| model.what_counts_near(&model.held(&q), nearby, &counts);
             let found = asked(&mut counted);
             let least = |wanted: &dyn Fn(ClearanceClass) -> bool| {
                 let classes = minima.iter().map(|each| each.class);
@@ -201,8 +202,8 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
                 .map(|each| each.separation.distance_m - floor_m(each.class))
                 .fold(counts.excess_cap_m, f64::min);
             assert_eq!(found.excess_m, excess_m, "{k}");
-            let of_pair = found.excess_of.map(|pair| {
-                let pair = &pairs[pair];
+            let of_pair = found.excess_of.map(|couple| {
+                let pair = &pairs[couple.pair];
                 pair.separation.distance_m - floor_m(pair.class)
             });
             assert_eq!(of_pair.unwrap_or(counts.excess_cap_m), excess_m, "{k}");
@@ -212,7 +213,7 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
                     ends_below_m,
                     ..counts
                 };
-                let ended = model.what_counts_near(&q, &mut mixed, &counts);
+                let ended = model.what_counts_near(&model.held(&q), &mut mixed, &counts);
                 if excess_m < ends_below_m {
                     assert!(ended.excess_m < ends_below_m, "{k}");
                 } else {

@@ -17,10 +17,10 @@
 mod aim;
 mod ranges;
 
-use std::f64::consts::TAU;
+use std::cell::OnceCell;
 
 use needlebench_cell::ClearanceClass;
-use needlebench_clearance::{AIMS, Counts, Nearby};
+use needlebench_clearance::{AIMS, Counts, Couple, Held, Nearby};
 use needlebench_kinematics::ik::{Configuration, Solution, Solutions, wrap_angle};
 use needlebench_scenario::Goal;
 
@@ -115,10 +115,23 @@ pub(crate) struct Glance {
     pub works: bool,
     /// [`Member::surplus`] of one that exists, as far as it was asked for; else any value below the asked one.
     pub surplus: f64,
-    /// The pair whose clearance it is, unless the joints decide it.
-    pub decided_by: Option<usize>,
+    /// The solids whose clearance it is, unless the joints decide it.
+    pub decided_by: Option<Couple>,
+    /// Of one that works and whose merit was asked for: by class the solids that are nearest to each other, and how near,
+    /// m, where that is nearer than what is wanted.
+    nearest: [(f64, Option<Couple>); CLASS_COUNT],
     /// That of none if it does not work.
     pub merit: Merit,
+}
+
+/// A configuration at a roll.
+#[derive(Debug, Clone)]
+pub(crate) struct At {
+    roll_rad: f64,
+    /// The posture and where it holds the links; none where the configuration does not reach the pose.
+    found: Option<(Solution, Held)>,
+    /// How far it falls short, m, of one without a posture; found when it is asked for.
+    missing_m: OnceCell<f64>,
 }
 
 /// The required clearances.
@@ -186,46 +199,88 @@ impl<'p> Sweep<'p> {
         self.planner.present(roll_rad, &solution, &mut self.nearby)
     }
 
+    /// The configuration at a roll, to be looked at.
+    pub(crate) fn at(&self, roll_rad: f64) -> At {
+        let model = self.planner.checker.model;
+        let found = self.solution(roll_rad);
+        At {
+            roll_rad,
+            found: found.map(|solution| (solution, model.held(&solution.joints))),
+            missing_m: OnceCell::new(),
+        }
+    }
+
     /// What an aim's choice needs to know of the member at a roll.
     pub(crate) fn glance(&mut self, aim: Aim, roll_rad: f64) -> Glance {
+        self.glance_at(aim, &self.at(roll_rad))
+    }
+
+    /// The same where the configuration is known.
+    pub(crate) fn glance_at(&mut self, aim: Aim, at: &At) -> Glance {
         let asked = Asked::Merit(aim);
-        self.look(asked, roll_rad, asked.ends_below_m())
+        self.look(asked, at, asked.ends_below_m())
     }
 
     /// Constraint margin of the member at a roll if clearances had to keep a level, and whether it keeps that.
-    pub fn keeps(&mut self, level: Level, roll_rad: f64) -> Glance {
-        self.keeps_more_than(f64::NEG_INFINITY, level, roll_rad)
+    pub fn keeps_at(&mut self, level: Level, at: &At) -> Glance {
+        self.keeps_more_than(f64::NEG_INFINITY, level, at)
     }
 
     /// The same; a constraint margin below `least` may come out as any other below it.
-    pub fn keeps_more_than(&mut self, least: f64, level: Level, roll_rad: f64) -> Glance {
-        self.look(Asked::Surplus(level), roll_rad, least)
+    pub fn keeps_more_than(&mut self, least: f64, level: Level, at: &At) -> Glance {
+        self.look(Asked::Surplus(level), at, least)
+    }
+
+    /// What [`Sweep::keeps_at`] says, of a member that works and of which a glance said so: its clearances are known as far
+    /// as they fall short of what is wanted.
+    pub(crate) fn keeps_by(&self, level: Level, at: &At, glance: &Glance) -> Option<Glance> {
+        let (solution, _) = at.found.as_ref().filter(|_| glance.works)?;
+        let planner = self.planner;
+        let margins = planner.margins(&solution.joints);
+        let mut surplus = planner.surplus_of_joints(&margins, &[]);
+        let mut decided_by = None;
+        let floor_m = planner.counts(Asked::Surplus(level)).floor_m;
+        for ((nearest_m, couple), floor_m) in glance.nearest.iter().zip(floor_m) {
+            let excess_m = nearest_m - floor_m;
+            if floor_m > f64::NEG_INFINITY && excess_m < surplus {
+                (surplus, decided_by) = (excess_m, *couple);
+            }
+        }
+        Some(Glance {
+            works: surplus >= 0.0,
+            surplus,
+            decided_by,
+            merit: Merit::NONE,
+            ..*glance
+        })
     }
 
     /// Whether what keeps a roll from working keeps all from working between it and another: it is broken by
     /// more than the arm moves on the way, of the flange where there is no posture.
-    pub(crate) fn excludes(&mut self, roll_rad: f64, glance: &Glance, to_rad: f64) -> bool {
-        let rolls = [roll_rad, to_rad].map(|roll_rad| roll_rad.rem_euclid(TAU));
-        match rolls.map(|roll_rad| self.solution(roll_rad)) {
-            [Some(from), Some(to)] => {
+    pub(crate) fn excludes(&mut self, from: &At, glance: &Glance, to: &At) -> bool {
+        match (&from.found, &to.found) {
+            (Some((start, held)), Some((end, held_there))) => {
                 let change_m = match glance.decided_by {
-                    Some(pair) => {
+                    Some(couple) => {
                         let model = self.planner.checker.model;
-                        model.travel_m(pair, &from.joints, &to.joints)
+                        model.travel_m(couple, held, held_there)
                     }
-                    None => METRES_PER_UNIT * (from.joints - to.joints).map(wrap_angle).amax(),
+                    None => METRES_PER_UNIT * (start.joints - end.joints).map(wrap_angle).amax(),
                 };
                 change_m < -glance.surplus
             }
-            [None, None] => {
-                let [from, to] =
-                    rolls.map(|roll_rad| self.planner.base_link_from_flange(self.goal, roll_rad));
+            (None, None) => {
+                let [start, end] =
+                    [from, to].map(|at| self.planner.base_link_from_flange(self.goal, at.roll_rad));
                 // Of the wrist before the flange, and the joint before that.
                 let geometry = &self.planner.kinematics().geometry;
                 let reach_m = geometry.d6.abs() + geometry.d5.abs();
-                let turn_rad = from.rotation.angle_to(&to.rotation);
-                let moved_m = (from.translation.vector - to.translation.vector).norm();
-                moved_m + turn_rad * reach_m < -self.surplus(rolls[0]).0
+                let turn_rad = start.rotation.angle_to(&end.rotation);
+                let moved_m = (start.translation.vector - end.translation.vector).norm();
+                let missing_m = from
+                    .missing_m
+                    .get_or_init(|| -self.member(from.roll_rad).surplus);
+                moved_m + turn_rad * reach_m < *missing_m
             }
             _ => false,
         }
@@ -233,7 +288,7 @@ impl<'p> Sweep<'p> {
 
     /// Constraint margin of the member at a roll, and whether it is feasible.
     pub fn surplus(&mut self, roll_rad: f64) -> (f64, bool) {
-        let seen = self.keeps(Level::Floor, roll_rad);
+        let seen = self.keeps_at(Level::Floor, &self.at(roll_rad));
         if seen.exists {
             (seen.surplus, seen.works)
         } else {
@@ -241,20 +296,22 @@ impl<'p> Sweep<'p> {
         }
     }
 
-    fn look(&mut self, asked: Asked, roll_rad: f64, ends_below_m: f64) -> Glance {
+    fn look(&mut self, asked: Asked, at: &At, ends_below_m: f64) -> Glance {
         let planner = self.planner;
-        let Some(solution) = self.solution(roll_rad) else {
+        let nothing_near = [(f64::INFINITY, None); CLASS_COUNT];
+        let Some((solution, held)) = &at.found else {
             return Glance {
                 exists: false,
                 works: false,
                 surplus: f64::NEG_INFINITY,
                 decided_by: None,
+                nearest: nothing_near,
                 merit: Merit::NONE,
             };
         };
         let q = &solution.joints;
         let margins = planner.margins(q);
-        let broken = planner.joint_rules(&solution);
+        let broken = planner.joint_rules(solution);
         let mut counts = match &self.counts {
             Some((known, counts)) if *known == asked => *counts,
             _ => {
@@ -266,7 +323,7 @@ impl<'p> Sweep<'p> {
         counts.excess_cap_m = planner.surplus_of_joints(&margins, &broken);
         counts.ends_below_m = ends_below_m;
         let model = planner.checker.model;
-        let found = model.what_counts_near(q, &mut self.nearby, &counts);
+        let found = model.what_counts_near(held, &mut self.nearby, &counts);
         let works = broken.is_empty() && found.excess_m >= 0.0;
         let merit = match asked {
             Asked::Surplus(_) => Merit::NONE,
@@ -294,6 +351,12 @@ impl<'p> Sweep<'p> {
             works,
             surplus: found.excess_m,
             decided_by: found.excess_of,
+            nearest: match asked {
+                Asked::Merit(_) if works => std::array::from_fn(|class| {
+                    (found.by_class_m[class], found.couple_of_class[class])
+                }),
+                _ => nothing_near,
+            },
             merit,
         }
     }
@@ -513,6 +576,7 @@ impl Planner<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
     use std::path::Path;
 
     use needlebench_clearance::ClearanceModel;
@@ -540,7 +604,8 @@ mod tests {
                         assert_eq!(sweep.works(roll_rad), alone.works());
                         assert_eq!(sweep.surplus(roll_rad), (alone.surplus, alone.works()));
                         for least in [-0.05, -0.002, 0.0] {
-                            let seen = sweep.keeps_more_than(least, Level::Floor, roll_rad);
+                            let at = sweep.at(roll_rad);
+                            let seen = sweep.keeps_more_than(least, Level::Floor, &at);
                             if alone.candidate.is_some() && alone.surplus >= least {
                                 assert_eq!(seen.surplus, alone.surplus);
                             } else {

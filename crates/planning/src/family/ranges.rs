@@ -6,7 +6,7 @@ use needlebench_kinematics::ik::{Configuration, wrap_angle};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 use needlebench_scenario::Goal;
 
-use super::{Aim, Glance, Level, Member, Merit, Sweep, nearest_missing};
+use super::{Aim, At, Glance, Level, Member, Merit, Sweep, nearest_missing};
 use crate::Rejection;
 use crate::limits::Shortfall;
 use crate::planner::Planner;
@@ -251,9 +251,14 @@ impl Planner<'_> {
         aim: Aim,
     ) -> Member {
         let mut sweep = Sweep::new(self, goal, configuration);
+        let places: Vec<At> = rolls_rad.iter().map(|&roll| sweep.at(roll)).collect();
         let grid: Vec<Seen> = rolls_rad
             .iter()
-            .map(|&roll_rad| Seen::at(&mut sweep, aim, roll_rad))
+            .zip(&places)
+            .map(|(&roll_rad, at)| Seen {
+                roll_rad,
+                glance: sweep.glance_at(aim, at),
+            })
             .collect();
         let mut best = highest_of_circle(&mut sweep, aim, &grid);
         let shortfall = best.as_ref().map(|best| best.merit.shortfall);
@@ -265,18 +270,23 @@ impl Planner<'_> {
             } else {
                 Level::Judged
             };
-            let knots = grid.iter().map(|seen| Seen {
-                glance: sweep.keeps(level, seen.roll_rad),
-                ..*seen
-            });
-            let knots: Vec<Seen> = knots.collect();
+            let glances: Vec<Glance> = grid
+                .iter()
+                .zip(&places)
+                .map(|(seen, at)| {
+                    let known = sweep.keeps_by(level, at, &seen.glance);
+                    known.unwrap_or_else(|| sweep.keeps_at(level, at))
+                })
+                .collect();
+            let count = grid.len();
+            let knot = |k: usize| Looked {
+                roll_rad: unrolled(k, count, |k| grid[k].roll_rad),
+                at: &places[k % count],
+                glance: &glances[k % count],
+            };
             let mut found = Vec::new();
-            for (k, here) in knots.iter().enumerate() {
-                let next = Seen {
-                    roll_rad: unrolled(k + 1, knots.len(), |k| knots[k].roll_rad),
-                    ..knots[(k + 1) % knots.len()]
-                };
-                scan(&mut sweep, level, here, &next, &mut found);
+            for k in 0..count {
+                scan(&mut sweep, level, knot(k), knot(k + 1), &mut found);
             }
             if !found.is_empty() {
                 let mut all = grid.clone();
@@ -290,11 +300,13 @@ impl Planner<'_> {
             return sweep.member(best.roll_rad.rem_euclid(TAU));
         }
         let mut nearest: Option<(f64, f64)> = None;
-        for seen in grid.iter().filter(|seen| seen.glance.exists) {
+        for (seen, at) in grid
+            .iter()
+            .zip(&places)
+            .filter(|(seen, _)| seen.glance.exists)
+        {
             let most = nearest.map_or(f64::NEG_INFINITY, |(most, _)| most);
-            let surplus = sweep
-                .keeps_more_than(most, Level::Floor, seen.roll_rad)
-                .surplus;
+            let surplus = sweep.keeps_more_than(most, Level::Floor, at).surplus;
             if nearest.is_none() || surplus > most {
                 nearest = Some((surplus, seen.roll_rad));
             }
@@ -321,6 +333,14 @@ impl Seen {
             glance: sweep.glance(aim, roll_rad.rem_euclid(TAU)),
         }
     }
+}
+
+/// A roll at which a level of clearances was asked for.
+#[derive(Clone, Copy)]
+struct Looked<'s> {
+    roll_rad: f64,
+    at: &'s At,
+    glance: &'s Glance,
 }
 
 /// The best of all feasible stretches on a circle of rolls in ascending order; of equal ones the first.
@@ -353,24 +373,33 @@ fn highest_of_circle(sweep: &mut Sweep<'_>, aim: Aim, all: &[Seen]) -> Option<Pe
 /// A half of the way is left out where what is broken at the end is broken by more than the arm moves from there
 /// to the middle: nothing in it keeps the level, as far as the arm goes there by the shortest way. What remains is
 /// looked at down to [`SCAN_RAD`].
-fn scan(sweep: &mut Sweep<'_>, level: Level, low: &Seen, high: &Seen, found: &mut Vec<f64>) {
+fn scan(
+    sweep: &mut Sweep<'_>,
+    level: Level,
+    low: Looked<'_>,
+    high: Looked<'_>,
+    found: &mut Vec<f64>,
+) {
     if low.glance.works || high.glance.works || high.roll_rad - low.roll_rad < 2.0 * SCAN_RAD {
         return;
     }
     let middle_rad = f64::midpoint(low.roll_rad, high.roll_rad);
-    let mut is_excluded = |end: &Seen| sweep.excludes(end.roll_rad, &end.glance, middle_rad);
+    let at = sweep.at(middle_rad.rem_euclid(TAU));
+    let mut is_excluded = |end: Looked<'_>| sweep.excludes(end.at, end.glance, &at);
     if is_excluded(low) && is_excluded(high) {
         return;
     }
-    let middle = Seen {
-        roll_rad: middle_rad,
-        glance: sweep.keeps(level, middle_rad.rem_euclid(TAU)),
-    };
-    if middle.glance.works {
+    let glance = sweep.keeps_at(level, &at);
+    if glance.works {
         found.push(middle_rad.rem_euclid(TAU));
     }
-    scan(sweep, level, low, &middle, found);
-    scan(sweep, level, &middle, high, found);
+    let middle = Looked {
+        roll_rad: middle_rad,
+        at: &at,
+        glance: &glance,
+    };
+    scan(sweep, level, low, middle, found);
+    scan(sweep, level, middle, high, found);
 }
 
 /// The roll of a knot, counted on beyond the last one.

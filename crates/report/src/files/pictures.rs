@@ -61,8 +61,22 @@ impl<'a> Pictures<'a> {
         let goal = &self.resolved.goals[index].name;
         let report = &run.goals[index];
         let [posture, space] = KINDS;
-        self.write_postures(posture, index, run, names)?;
-        self.write_space(space, index, run, names)?;
+        {
+            let stage = self
+                .backdrop
+                .stage(self.resolved, &self.resolved.goals[index]);
+            let draw = |shown: &Shown<'_>| configuration_picture(self.resolved, &stage, shown);
+            self.write_kind(posture, index, run, names, &draw, sheet_caption)?;
+        }
+        let room = RoomPictures::new(self.resolved, &self.backdrop, &self.room, index);
+        self.write_kind(
+            space,
+            index,
+            run,
+            names,
+            &|shown: &Shown<'_>| room.draw(shown),
+            room_caption,
+        )?;
         for (kind, chart) in CHARTS
             .iter()
             .zip([ranking_chart(report), budget_chart(report)])
@@ -76,32 +90,6 @@ impl<'a> Pictures<'a> {
             }
         }
         Ok(())
-    }
-
-    fn write_postures(
-        &self,
-        kind: &str,
-        index: usize,
-        run: &Report,
-        names: &mut [Vec<String>],
-    ) -> Result<(), FilesError> {
-        let stage = self
-            .backdrop
-            .stage(self.resolved, &self.resolved.goals[index]);
-        let draw = |shown: &Shown<'_>| configuration_picture(self.resolved, &stage, shown);
-        self.write_kind(kind, index, run, names, &draw, sheet_caption)
-    }
-
-    fn write_space(
-        &self,
-        kind: &str,
-        index: usize,
-        run: &Report,
-        names: &mut [Vec<String>],
-    ) -> Result<(), FilesError> {
-        let room = RoomPictures::new(self.resolved, &self.backdrop, &self.room, index);
-        let draw = |shown: &Shown<'_>| room.draw(shown);
-        self.write_kind(kind, index, run, names, &draw, room_caption)
     }
 
     /// Draws all configurations of a goal, on all threads, and a sheet of them.

@@ -27,6 +27,9 @@ pub(super) struct Errors {
 /// Points of the lattice.
 const POINTS: u32 = 32_768;
 
+/// Every one of so many of them is a lattice as well: of 1024 points, the smallest for which the rules are made.
+const COARSE: usize = 32;
+
 /// Generating vector of F. Kuo's embedded lattice rules `lattice-32001-1024-1048576.3600` (University of New South
 /// Wales), by Cools, Kuo and Nuyens, SIAM Journal on Scientific Computing 28(6), 2006: two dimensions across the widest
 /// axis, two for each of two breaths, two for each of two discs or two for a bend.
@@ -42,6 +45,9 @@ const FAR: f64 = 9.0;
 
 /// How exactly the distance is found, m.
 const RADIUS_TOLERANCE_M: f64 = 1e-9;
+
+/// How exactly it is found with few points, in terms of the farthest.
+const COARSE_TOLERANCE: f64 = 1e-4;
 
 impl Errors {
     /// The same along other axes.
@@ -157,6 +163,22 @@ struct Point {
     weight: f64,
 }
 
+impl Point {
+    /// How much of it is within a radius, if it is spread along the axis by a standard deviation.
+    fn inside(&self, spread_m: f64, radius_m: f64) -> f64 {
+        let half = radius_m * radius_m - self.across_m2;
+        if half <= 0.0 {
+            return 0.0;
+        }
+        let (half, mean) = (half.sqrt(), self.along_m);
+        if spread_m <= NOTHING_M {
+            return self.weight * f64::from(u8::from(mean.abs() <= half));
+        }
+        let below = |end: f64| normal::probability_below((end - mean) / spread_m);
+        self.weight * (below(half) - below(-half))
+    }
+}
+
 /// A coordinate of a point of the lattice, strictly between 0 and 1, folded so that a function need not be periodic.
 fn coordinate(index: u32, dimension: usize) -> f64 {
     let at = index.wrapping_mul(LATTICE[dimension]) % POINTS;
@@ -165,57 +187,85 @@ fn coordinate(index: u32, dimension: usize) -> f64 {
 }
 
 /// The radius of the ball that a share of all is in, each point spread along the axis by the same standard deviation.
+///
+/// Of two that are no farther apart than the tolerance the larger one; the share is in between those of both.
 fn quantile(points: &[Point], spread_m: f64, probability: f64) -> f64 {
-    let all: f64 = points.iter().map(|point| point.weight).sum();
-    let inside = |radius_m: f64| -> f64 {
-        let of_point = |point: &Point| {
-            let half = radius_m * radius_m - point.across_m2;
-            if half <= 0.0 {
-                return 0.0;
-            }
-            let (half, mean) = (half.sqrt(), point.along_m);
-            if spread_m <= NOTHING_M {
-                return point.weight * f64::from(u8::from(mean.abs() <= half));
-            }
-            let below = |end: f64| normal::probability_below((end - mean) / spread_m);
-            point.weight * (below(half) - below(-half))
-        };
-        points.iter().map(of_point).sum::<f64>() / all
-    };
     let farthest_m = points
         .iter()
         .map(|point| {
             let along_m = point.along_m.abs() + FAR * spread_m;
             (along_m * along_m + point.across_m2).sqrt()
         })
-        .fold(0.0, f64::max);
-    // Regula falsi as of Illinois; where it is slow, halves.
-    let (mut low_m, mut high_m) = (0.0, farthest_m + RADIUS_TOLERANCE_M);
-    let (mut below, mut above) = (inside(low_m) - probability, inside(high_m) - probability);
-    let mut halve = false;
-    while high_m - low_m > RADIUS_TOLERANCE_M {
-        let width_m = high_m - low_m;
-        let at_m = if halve {
-            low_m + 0.5 * width_m
-        } else {
-            let step_m = width_m * below / (below - above);
-            low_m
-                + step_m.clamp(
-                    0.25 * RADIUS_TOLERANCE_M,
-                    width_m - 0.25 * RADIUS_TOLERANCE_M,
-                )
+        .fold(RADIUS_TOLERANCE_M, f64::max);
+    // Few points say about where it is, and how the share grows there.
+    let mut start = Start {
+        at_m: 0.5 * farthest_m,
+        slope: probability / farthest_m,
+    };
+    let mut high_m = farthest_m;
+    for (step, tolerance_m) in [
+        (COARSE, COARSE_TOLERANCE * farthest_m),
+        (1, RADIUS_TOLERANCE_M),
+    ] {
+        let some = || points.iter().skip(step / 2).step_by(step);
+        let all: f64 = some().map(|point| point.weight).sum();
+        let excess = |radius_m: f64| {
+            let inside = some().map(|point| point.inside(spread_m, radius_m));
+            inside.sum::<f64>() / all - probability
         };
-        let found = inside(at_m) - probability;
-        if found < 0.0 {
-            (low_m, below) = (at_m, found);
-            above *= 0.5;
-        } else {
-            (high_m, above) = (at_m, found);
-            below *= 0.5;
-        }
-        halve = high_m - low_m > 0.5 * width_m;
+        (high_m, start) = root(excess, farthest_m, start, tolerance_m);
     }
     high_m
+}
+
+/// Where a root is expected, and the slope there.
+struct Start {
+    at_m: f64,
+    slope: f64,
+}
+
+/// The upper end of an interval of the width of a tolerance in which a function that grows from below 0 to above it
+/// changes its sign, and where the function has its root there.
+///
+/// Secants, each drawn out by less than half of the tolerance: the last two end on both sides of the root. Where three
+/// do not halve what is left, a half is taken.
+fn root(
+    function: impl Fn(f64) -> f64,
+    farthest_m: f64,
+    mut start: Start,
+    tolerance_m: f64,
+) -> (f64, Start) {
+    let (mut low_m, mut high_m) = (0.0, farthest_m);
+    let mut last: Option<(f64, f64)> = None;
+    let mut slow = 0;
+    while high_m - low_m > tolerance_m {
+        let Start { at_m, .. } = start;
+        let width_m = high_m - low_m;
+        let found = function(at_m);
+        if found < 0.0 {
+            low_m = at_m;
+        } else {
+            high_m = at_m;
+        }
+        if let Some((last_m, before)) = last {
+            start.slope = (found - before) / (at_m - last_m);
+        }
+        last = Some((at_m, found));
+        let step_m = -found / start.slope;
+        let next_m = at_m + step_m + (0.4 * tolerance_m).copysign(step_m);
+        slow = if high_m - low_m > 0.5 * width_m {
+            slow + 1
+        } else {
+            0
+        };
+        start.at_m = if slow < 3 && low_m < next_m && next_m < high_m {
+            next_m
+        } else {
+            slow = 0;
+            0.5 * (low_m + high_m)
+        };
+    }
+    (high_m, start)
 }
 
 #[cfg(test)]
@@ -262,6 +312,42 @@ mod tests {
         // Nearly one-sided: 1.644854 standard deviations.
         let found = normal_errors([1.0, 0.0, 0.0], [1e-3, 0.0, 0.0]).within_m(0.95);
         assert!((found - 1.001_644_854).abs() < 1e-8, "{found}");
+    }
+
+    /// The share is no less than asked at the distance, and is less a tolerance before it: of what is smooth, of steps,
+    /// and about a single point.
+    #[test]
+    fn the_distance_is_known_to_its_tolerance() {
+        let spread_points = |along_m: f64| -> Vec<Point> {
+            (0..POINTS)
+                .map(|index| Point {
+                    along_m: along_m * coordinate(index, 1),
+                    across_m2: (along_m * coordinate(index, 2)).powi(2),
+                    weight: 1.0 + coordinate(index, 3),
+                })
+                .collect()
+        };
+        for (along_m, spread_m) in [
+            (5e-3, 1e-3),
+            (5e-3, 1e-5),
+            (5e-3, 1e-8),
+            (5e-3, 1e-11),
+            (5e-3, 0.0),
+            (0.0, 1e-3),
+        ] {
+            let points = spread_points(along_m);
+            for probability in [0.05, 0.5, 0.95, 0.999_9] {
+                let found_m = quantile(&points, spread_m, probability);
+                let all: f64 = points.iter().map(|point| point.weight).sum();
+                let share = |radius_m: f64| {
+                    let inside = points.iter().map(|point| point.inside(spread_m, radius_m));
+                    inside.sum::<f64>() / all
+                };
+                let case = format!("{along_m} {spread_m} {probability}: {found_m}");
+                assert!(share(found_m) >= probability, "{case}");
+                assert!(share(found_m - RADIUS_TOLERANCE_M) < probability, "{case}");
+            }
+        }
     }
 
     /// The distance that 95 % of independent draws stay within.
