@@ -142,7 +142,7 @@ enum Command {
         after_long_help = JUDGE_HELP
     )]
     Judge(Box<JudgeArguments>),
-    /// Insert a needle into tissue by itself.
+    /// Insert a needle into tissue by itself; find the force across its tip from recorded bends.
     #[command(after_help = "Example: needlebench needle insert guide/examples/needle.toml")]
     Needle(NeedleArguments),
     /// List collision pairs, enabled or disabled, with reasons; check an SRDF.

@@ -1,6 +1,8 @@
 //! `needlebench needle`: a needle in tissue, without a robot.
 
+mod bends;
 mod case;
+mod fit;
 mod insert;
 mod setup;
 
@@ -10,6 +12,7 @@ use crate::exit::ExitStatus;
 use crate::failure::Failure;
 
 pub use case::needle_case_schema;
+use fit::{FIT_HELP, FitArguments, fit};
 use insert::{INSERT_HELP, InsertArguments, insert_case};
 
 #[derive(Debug, Args)]
@@ -26,11 +29,18 @@ enum NeedleCommand {
         after_long_help = INSERT_HELP
     )]
     Insert(InsertArguments),
+    /// Find the force across the tip from recorded bends of a needle.
+    #[command(
+        after_help = "Example: needlebench needle fit guide/examples/bends.csv --held hub --gauge 22 --needle-length-mm 89",
+        after_long_help = FIT_HELP
+    )]
+    Fit(Box<FitArguments>),
 }
 
 /// Runs a subcommand of `needle`.
 pub(crate) fn needle(arguments: &NeedleArguments) -> Result<ExitStatus, Failure> {
     match &arguments.command {
         NeedleCommand::Insert(arguments) => insert_case(arguments),
+        NeedleCommand::Fit(arguments) => fit(arguments),
     }
 }
