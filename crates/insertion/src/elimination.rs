@@ -11,15 +11,15 @@ pub(crate) const MOMENT: usize = 3;
 /// Displacements of a path in the two planes, m.
 pub(crate) type Across = [f64; 2];
 
-/// What is before a node: `stiffness * u = right`, and the slope at the exit as `slope + turn . u`.
+/// What is before a node: `stiffness * u = right`, and at the exit `exit + turn * u`: the slope, and the force that holds it.
 ///
 /// The path behind the tip is frozen, so this never changes once the tip has passed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Elimination {
     pub stiffness: Matrix2<f64>,
     pub right: Matrix2x4<f64>,
-    pub slope: RowVector4<f64>,
-    pub turn: Vector2<f64>,
+    pub exit: Matrix2x4<f64>,
+    pub turn: Matrix2<f64>,
 }
 
 /// The tip at a node, before anything is known of the path there and of the force.
@@ -28,7 +28,7 @@ pub(crate) struct Tip {
     before: Elimination,
     /// By the path's displacement at the tip.
     by_path: Vector2<f64>,
-    slope_by_path: f64,
+    exit_by_path: Vector2<f64>,
 }
 
 impl Elimination {
@@ -63,16 +63,18 @@ impl Elimination {
         let flexible = rotation_nm.map_or(0.0, |rotation_nm| 1.0 / (rotation_nm + k11[(1, 1)]));
         let across = k12.row(1).transpose();
         let slope = near.row(1) * flexible;
-        let turn = -across * flexible;
+        let turn = -across.transpose() * flexible;
+        let coupling = k11[(0, 1)];
+        let slope_by_path = flexible * of_second[0].y;
         let before = Self {
             stiffness: k22 - across * across.transpose() * flexible,
             right: far - across * slope,
-            slope,
-            turn,
+            exit: Matrix2x4::from_rows(&[slope, slope * coupling - near.row(0)]),
+            turn: Matrix2::from_rows(&[turn, turn * coupling + k12.row(0)]),
         };
         let by_path = Open {
-            right: of_second[1] - across * (flexible * of_second[0].y),
-            slope: flexible * of_second[0].y,
+            right: of_second[1] - across * slope_by_path,
+            exit: Vector2::new(slope_by_path, coupling * slope_by_path - of_second[0].x),
         };
         (before, by_path)
     }
@@ -89,7 +91,7 @@ impl Elimination {
         Tip {
             before,
             by_path: by_path.right,
-            slope_by_path: by_path.slope,
+            exit_by_path: by_path.exit,
         }
     }
 
@@ -99,7 +101,7 @@ impl Elimination {
         Tip {
             before,
             by_path: by_path.right,
-            slope_by_path: by_path.slope,
+            exit_by_path: by_path.exit,
         }
     }
 
@@ -115,16 +117,16 @@ impl Elimination {
             near.column_mut(plane).axpy(1.0, &first, 1.0);
             far.column_mut(plane).copy_from(&second);
         }
-        let lean = inverse.transpose() * self.turn;
+        let lean = self.turn * inverse;
         let before = Self {
             stiffness: k22 - back * k12,
             right: far - back * near,
-            slope: self.slope + lean.transpose() * near,
-            turn: -(k12.transpose() * lean),
+            exit: self.exit + lean * near,
+            turn: -(lean * k12),
         };
         let by_path = Open {
             right: of_second[1] - back * of_second[0],
-            slope: lean.dot(&of_second[0]),
+            exit: lean * of_second[0],
         };
         (before, by_path)
     }
@@ -134,7 +136,9 @@ impl Elimination {
             self.right
                 .column_mut(plane)
                 .axpy(displacement, &open.right, 1.0);
-            self.slope[plane] += displacement * open.slope;
+            self.exit
+                .column_mut(plane)
+                .axpy(displacement, &open.exit, 1.0);
         }
         self
     }
@@ -155,13 +159,13 @@ impl Elimination {
 /// What a displacement of the path at the second node of an element adds.
 struct Open {
     right: Vector2<f64>,
-    slope: f64,
+    exit: Vector2<f64>,
 }
 
 impl Tip {
-    /// Displacement of the tip by each right side, and the slope at the exit, where the path goes through the tip; `force`
-    /// in both planes, N.
-    pub fn answers(&self, force: Across) -> (RowVector4<f64>, RowVector4<f64>) {
+    /// Displacement of the tip by each right side, and slope and force at the exit, where the path goes through the tip;
+    /// `force` in both planes, N.
+    pub fn answers(&self, force: Across) -> (RowVector4<f64>, Matrix2x4<f64>) {
         let inverse = inverse(&self.before.stiffness);
         let mut right = self.before.right;
         for (plane, &force) in force.iter().enumerate() {
@@ -172,17 +176,15 @@ impl Tip {
         // The path at the tip is the tip's own displacement.
         let displacement = without.row(0) / (1.0 - by_path.x);
         let all = without + by_path * displacement;
-        let slope = self.before.slope
-            + self.before.turn.transpose() * all
-            + displacement * self.slope_by_path;
-        (displacement, slope)
+        let exit = self.before.exit + self.before.turn * all + self.exit_by_path * displacement;
+        (displacement, exit)
     }
 
     /// What is before the tip's node once its displacement is known.
     pub fn closed(&self, path: Across) -> Elimination {
         let open = Open {
             right: self.by_path,
-            slope: self.slope_by_path,
+            exit: self.exit_by_path,
         };
         self.before.closed(&open, path)
     }

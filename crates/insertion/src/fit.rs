@@ -109,6 +109,7 @@ pub fn fit_force(
     };
     let mut factor = 1.0_f64;
     let mut slopes = Vec::new();
+    let mut is_found = false;
     for _ in 0..STEPS {
         let step = 1e-4 * factor.abs().max(1e-3);
         let (here, there) = (of(factor)?, of(factor + step)?);
@@ -131,9 +132,14 @@ pub fn fit_force(
             .sum::<f64>()
             / steep;
         factor += change;
-        if change.abs() <= 1e-9 * factor.abs() {
+        is_found = change.abs() <= 1e-9 * factor.abs();
+        if is_found {
             break;
         }
+    }
+    // With play, bends jump where the force changes its sign: there may be no factor between.
+    if !is_found {
+        return Err(FitError::NotIdentifiable);
     }
     let freedom = bends.len() - 1;
     let off = of(factor)?

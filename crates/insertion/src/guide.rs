@@ -33,13 +33,23 @@ pub(crate) struct Seat {
     pub slope: Vector2<f64>,
 }
 
-/// What the rest of the needle answers at the exit: its slope is `slope + by_exit * displacement + by_moment * moment`.
+/// What the rest of the needle answers at the exit, with the spring of two supports: its slope is
+/// `slope + slope_by_exit * displacement + slope_by_moment * moment`, and what holds its displacement there is
+/// `force + force_by_exit * displacement - slope_by_exit * moment` (Maxwell and Betti).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Answer {
     pub slope: Vector2<f64>,
-    pub by_exit: f64,
-    pub by_moment: f64,
+    pub force_n: Vector2<f64>,
+    pub slope_by_exit: f64,
+    pub slope_by_moment: f64,
+    pub force_by_exit: f64,
 }
+
+/// Rounds of the balance between both ends of the bore: most cases need two.
+const ROUNDS: usize = 200;
+
+/// Halves of the play until the place of an exit is known, to a part in 1e12.
+const HALVES: usize = 40;
 
 impl Guide {
     /// Stiffness against rotation at the exit of a beam on two supports, N m.
@@ -54,13 +64,18 @@ impl Guide {
 
     /// Where the needle comes to rest in the bore.
     ///
-    /// The force on the tip presses it to one side at the exit and to the other at the entry. With a slope at the exit
-    /// below 6 play / length it is a beam on two supports; above, it lies on the wall from the entry on and leaves it at a
-    /// distance g' before the exit, with neither slope nor moment there, so that the slope is 6 play / g' and the moment
-    /// 12 EI play / g'^2 = EI slope^2 / (3 play). Without enough force to lean on both it is free to turn.
+    /// At both ends it is within the play: either free, or on the wall, which pushes. As a rule it is pressed to one side
+    /// at the exit and to the other at the entry, and is a beam on two supports. Where that would press it into the wall
+    /// behind the entry, it lies on the wall and leaves it at a distance g' before the exit, with neither slope nor moment
+    /// there: off the wall by s at the exit its slope is 3 s / g', and its moment 6 EI s / g'^2 = 2 EI slope^2 / (3 s).
     pub(crate) fn seat(&self, bending_nm2: f64, answer: &Answer) -> Seat {
         let Self { length_m, play_m } = *self;
         let rotation_nm = self.rotation_nm(bending_nm2);
+        let Answer {
+            slope_by_exit,
+            slope_by_moment,
+            ..
+        } = *answer;
         let bent = answer.slope.norm();
         if bent == 0.0 {
             return Seat {
@@ -69,27 +84,120 @@ impl Guide {
                 slope: Vector2::zeros(),
             };
         }
-        let along = answer.slope / bent;
-        // By the play at the exit alone.
-        let bare = bent + answer.by_exit * play_m;
-        let leaning_nm = rotation_nm * self.lean();
-        let mut slope = bare + answer.by_moment * leaning_nm;
-        let mut moment_nm = leaning_nm;
-        if slope < self.lean() {
-            // No moment at all: what the spring takes is given back.
-            slope = bare / (1.0 - answer.by_moment * rotation_nm);
-            moment_nm = rotation_nm * slope;
-        } else if play_m > 0.0 && slope > 6.0 * play_m / length_m {
-            // slope = bare + by_moment (rotation slope - EI slope^2 / (3 play))
-            let a = answer.by_moment * bending_nm2 / (3.0 * play_m);
-            let b = 1.0 - answer.by_moment * rotation_nm;
-            slope = 2.0 * bare / (b + (b * b + 4.0 * a * bare).sqrt());
-            moment_nm = rotation_nm * slope - bending_nm2 * slope * slope / (3.0 * play_m);
+        let mut exit_m = answer.slope * (play_m / bent);
+        let mut entry_m = -exit_m;
+        let slope_of = |exit_m: Vector2<f64>, entry_m: Vector2<f64>| {
+            let chord = (exit_m - entry_m) / length_m;
+            (
+                answer.slope + exit_m * slope_by_exit + chord * (slope_by_moment * rotation_nm),
+                chord,
+            )
+        };
+        // Energy's second derivatives by the displacement at the entry and at the exit.
+        let shear = rotation_nm / length_m;
+        let of_entry = shear * (1.0 - slope_by_moment * rotation_nm) / length_m;
+        let of_exit = answer.force_by_exit - 2.0 * shear * slope_by_exit + of_entry;
+        for _ in 0..ROUNDS {
+            let (slope, chord) = slope_of(exit_m, entry_m);
+            let now = within(entry_m, (slope - chord) * shear, of_entry, play_m);
+            let (slope, chord) = slope_of(exit_m, now);
+            let force_n = answer.force_n + exit_m * answer.force_by_exit
+                - chord * (rotation_nm * slope_by_exit)
+                - (slope - chord) * shear;
+            let next = within(exit_m, force_n, of_exit, play_m);
+            let change = (now - entry_m).norm() + (next - exit_m).norm();
+            (entry_m, exit_m) = (now, next);
+            if change <= 1e-9 * play_m {
+                break;
+            }
+        }
+        let (mut slope, chord) = slope_of(exit_m, entry_m);
+        let mut moment_nm = chord * rotation_nm;
+        // Away from the wall at the entry.
+        let away = entry_m * (-1.0 / play_m);
+        let is_there = play_m > 0.0 && away.norm() > 1.0 - 1e-9;
+        if is_there && slope.dot(&away) > 3.0 * chord.dot(&away) {
+            let on_wall = self.on_wall(bending_nm2, answer, &away);
+            exit_m += away * (on_wall.exit_m - exit_m.dot(&away));
+            moment_nm += away * (on_wall.moment_nm - moment_nm.dot(&away));
+            slope += away * (on_wall.slope - slope.dot(&away));
         }
         Seat {
-            exit_m: along * play_m,
-            moment_nm: along * moment_nm,
-            slope: along * slope,
+            exit_m,
+            moment_nm,
+            slope,
         }
+    }
+
+    /// A needle that lies on the wall from the entry on, with its exit on the other wall or before it.
+    fn on_wall(&self, bending_nm2: f64, answer: &Answer, away: &Vector2<f64>) -> OnWall {
+        let Self { play_m, .. } = *self;
+        let rotation_nm = self.rotation_nm(bending_nm2);
+        let [slope, force_n] = [answer.slope, answer.force_n].map(|each| each.dot(away));
+        // With the exit at a displacement: what it is then, and what has to hold it.
+        let at = |exit_m: f64| {
+            let off_m = exit_m + play_m;
+            // slope = bare + by_moment (rotation slope - 2 EI slope^2 / (3 off))
+            let bare = (slope + answer.slope_by_exit * exit_m).max(0.0);
+            let a = answer.slope_by_moment * bending_nm2 / (1.5 * off_m);
+            let b = 1.0 - answer.slope_by_moment * rotation_nm;
+            let slope = 2.0 * bare / (b + (b * b + 4.0 * a * bare).sqrt());
+            let wall_nm = bending_nm2 * slope * slope / (1.5 * off_m);
+            let moment_nm = rotation_nm * slope - wall_nm;
+            let held_n = force_n + answer.force_by_exit * exit_m
+                - answer.slope_by_exit * moment_nm
+                - wall_nm * slope / (3.0 * off_m);
+            let found = OnWall {
+                exit_m,
+                moment_nm,
+                slope,
+            };
+            (found, held_n)
+        };
+        let (mut found, held_n) = at(play_m);
+        if held_n > 0.0 {
+            // The wall at the exit would have to pull.
+            let (mut low_m, mut high_m) = (-play_m, play_m);
+            for _ in 0..HALVES {
+                let (middle, held_n) = at(0.5 * (low_m + high_m));
+                found = middle;
+                if held_n > 0.0 {
+                    high_m = middle.exit_m;
+                } else {
+                    low_m = middle.exit_m;
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Along one direction.
+#[derive(Clone, Copy)]
+struct OnWall {
+    exit_m: f64,
+    moment_nm: f64,
+    slope: f64,
+}
+
+/// A place that a force moves until nothing of it is left, or until the wall bears it.
+fn within(
+    at_m: Vector2<f64>,
+    force_n: Vector2<f64>,
+    stiffness_n_m: f64,
+    play_m: f64,
+) -> Vector2<f64> {
+    let free = if stiffness_n_m > 0.0 {
+        at_m - force_n / stiffness_n_m
+    } else if force_n.norm() > 0.0 {
+        force_n * (-play_m / force_n.norm())
+    } else {
+        at_m
+    };
+    let far = free.norm();
+    if far > play_m {
+        free * (play_m / far)
+    } else {
+        free
     }
 }

@@ -1,6 +1,6 @@
 //! An insertion: the tip through all layers, element by element.
 
-use nalgebra::{RowVector4, Vector2};
+use nalgebra::{Matrix2x4, RowVector4, Vector2};
 
 use crate::element::Element;
 use crate::elimination::{Across, EXIT, Elimination, MOMENT, Tip};
@@ -11,10 +11,11 @@ use crate::needle::{Needle, NeedleError};
 /// Longest element within a layer, m: with it 60 random layered cases are within 1 um of a fifth of it in the median.
 const ELEMENT_M: f64 = 0.6e-3;
 
-/// The first element in tissue, m, and by how much each one is longer than the one before it. A long overhang is softer
-/// than the first tenths of a millimetre of stiff tissue: what the tip does there decides how the needle goes on.
-const FIRST_M: f64 = 2e-5;
-const GROWTH: f64 = 1.5;
+/// The first element in tissue that is stiffer than what is before it, m, and by how much each one is longer than the one
+/// before it. A long overhang is softer than the first tenths of a millimetre of stiff tissue: what the tip does there
+/// decides how the needle goes on. Shorter ones round: by 20 um at 2e-6 m.
+const FIRST_M: f64 = 4e-5;
+const GROWTH: f64 = 1.15;
 
 /// Elements of a layer at least.
 const LEAST_ELEMENTS: f64 = 3.0;
@@ -216,7 +217,7 @@ impl<'c> Case<'c> {
         }
         let bending_nm2 = needle.bending_stiffness_nm2();
         let (mut depths_m, mut elements) = (vec![0.0], Vec::new());
-        let (mut end_m, mut is_held) = (0.0, false);
+        let (mut end_m, mut before_n_m2) = (0.0, 0.0);
         for layer in layers.all() {
             let begin_m = end_m;
             end_m += layer.length_m;
@@ -227,15 +228,15 @@ impl<'c> Case<'c> {
                     elements.push(element);
                 };
             let mut from_m = begin_m;
-            if !is_held && layer.stiffness_n_m2 > 0.0 {
+            if layer.stiffness_n_m2 > before_n_m2 {
                 let mut length_m = FIRST_M;
                 while length_m < element_m && from_m + length_m < end_m {
                     add(from_m, from_m + length_m, &mut depths_m, &mut elements);
                     from_m += length_m;
                     length_m *= GROWTH;
                 }
-                is_held = true;
             }
+            before_n_m2 = layer.stiffness_n_m2;
             let rest_m = end_m - from_m;
             let count = (rest_m / element_m - 1e-9).ceil().max(LEAST_ELEMENTS);
             let mut number = 1.0;
@@ -326,7 +327,7 @@ impl<'c> Case<'c> {
                 _ if stays => Elimination::first_tip(element, self.rotation_nm(), path[at - 1]),
                 // The hub comes nearer.
                 _ => self
-                    .before(&path, at - 1, self.depths_m[at])
+                    .before(|at| [path[at], path[at + 1]], at - 1, self.depths_m[at])
                     .tip(element, path[at - 1]),
             };
             let cut = self.cut_by(&tip, self.force_n(self.depths_m[at]));
@@ -338,16 +339,18 @@ impl<'c> Case<'c> {
 
     /// Where the tip is.
     fn cut_by(&self, tip: &Tip, force: Across) -> Across {
-        let (displacement, slope) = tip.answers(force);
-        let seat = self.seat(&slope);
+        let (displacement, exit) = tip.answers(force);
+        let seat = self.seat(&exit);
         [0, 1].map(|plane| with(&displacement, plane, &seat))
     }
 
-    fn seat(&self, slope: &RowVector4<f64>) -> Seat {
+    fn seat(&self, exit: &Matrix2x4<f64>) -> Seat {
         let answer = Answer {
-            slope: Vector2::new(slope[0], slope[1]),
-            by_exit: slope[EXIT],
-            by_moment: slope[MOMENT],
+            slope: Vector2::new(exit[(0, 0)], exit[(0, 1)]),
+            force_n: Vector2::new(exit[(1, 0)], exit[(1, 1)]),
+            slope_by_exit: exit[(0, EXIT)],
+            slope_by_moment: exit[(0, MOMENT)],
+            force_by_exit: exit[(1, EXIT)],
         };
         match self.guide() {
             Some(guide) => guide.seat(self.bending_nm2, &answer),
@@ -359,43 +362,46 @@ impl<'c> Case<'c> {
         }
     }
 
-    /// What is before a node, with the tip at a depth.
-    fn before(&self, path: &[Across], node: usize, depth_m: f64) -> Elimination {
+    /// What is before a node, with the tip at a depth; `path` is that at both ends of an element.
+    fn before(
+        &self,
+        path: impl Fn(usize) -> [Across; 2],
+        node: usize,
+        depth_m: f64,
+    ) -> Elimination {
         let mut first = 0;
         let mut known = match self.before_skin(depth_m) {
             Some(before) => Elimination::first(&before, self.rotation_nm(), [[0.0; 2]; 2]),
             None => {
                 first = 1;
-                Elimination::first(&self.elements[0], self.rotation_nm(), [path[0], path[1]])
+                Elimination::first(&self.elements[0], self.rotation_nm(), path(0))
             }
         };
         for at in first..node {
-            known = known.next(&self.elements[at], [path[at], path[at + 1]]);
+            known = known.next(&self.elements[at], path(at));
         }
         known
     }
 
     /// The needle at the end of its way, on a path; with what has moved since.
     pub fn shape(&self, path: Vec<Across>, slip: Option<Slip>) -> Insertion {
-        let moved: Vec<Across> = path
-            .iter()
-            .zip(&self.depths_m)
-            .map(|(across, &depth_m)| {
-                let by_m = slip
-                    .filter(|slip| depth_m > slip.from_m)
-                    .map_or([0.0; 2], |slip| slip.by_m);
-                [across[0] + by_m[0], across[1] + by_m[1]]
-            })
-            .collect();
+        // Tissue moves whole, from the end of an element on.
+        let moved = |at: usize| {
+            let middle_m = 0.5 * (self.depths_m[at] + self.depths_m[at + 1]);
+            let [y_m, z_m] = slip
+                .filter(|slip| middle_m > slip.from_m)
+                .map_or([0.0; 2], |slip| slip.by_m);
+            [path[at], path[at + 1]].map(|[y, z]| [y + y_m, z + z_m])
+        };
         let depth_m = self.layers.depth_m();
         let last = self.elements.len();
         // What is before each node, from the skin on.
         let has_stand_off = self.before_skin(depth_m).is_some();
         let mut all: Vec<Elimination> = Vec::with_capacity(last + 1);
         let first = if has_stand_off { 0 } else { 1 };
-        all.push(self.before(&moved, first, depth_m));
+        all.push(self.before(moved, first, depth_m));
         for at in first..last {
-            all.push(all[at - first].next(&self.elements[at], [moved[at], moved[at + 1]]));
+            all.push(all[at - first].next(&self.elements[at], moved(at)));
         }
         let end = all[last - first];
         let inverse = end
@@ -407,8 +413,7 @@ impl<'c> Case<'c> {
             right[(0, plane)] += force_n;
         }
         let mut state = inverse * right;
-        let slope = end.slope + end.turn.transpose() * state;
-        let seat = self.seat(&slope);
+        let seat = self.seat(&(end.exit + end.turn * state));
         let mut shape = vec![[0.0; 2]; last + 1];
         let mut slopes = shape.clone();
         for at in (first..=last).rev() {
@@ -418,7 +423,7 @@ impl<'c> Case<'c> {
             }
             if at > first {
                 let (constant, by_next) =
-                    all[at - 1 - first].back(&self.elements[at - 1], [moved[at - 1], moved[at]]);
+                    all[at - 1 - first].back(&self.elements[at - 1], moved(at - 1));
                 state = constant + by_next * state;
             }
         }

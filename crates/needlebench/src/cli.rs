@@ -13,8 +13,8 @@ use crate::clock;
 use crate::command::{
     self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, CtArguments,
     DOCTOR_HELP, DoctorArguments, ExportArguments, FkArguments, ISO9283_HELP, IkArguments,
-    InitArguments, Iso9283Arguments, JUDGE_HELP, JudgeArguments, MergeArguments, PairsArguments,
-    PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
+    InitArguments, Iso9283Arguments, JUDGE_HELP, JudgeArguments, MergeArguments, NeedleArguments,
+    PairsArguments, PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
     ReportArguments, RunArguments, SEARCH_HELP, STUDY_HELP, SchemaFormat, SearchArguments,
     ServoArguments, StudyArguments, SuggestArguments, VIEW_HELP, ViewArguments,
 };
@@ -142,6 +142,9 @@ enum Command {
         after_long_help = JUDGE_HELP
     )]
     Judge(Box<JudgeArguments>),
+    /// Insert a needle into tissue by itself; find the force across its tip from recorded bends.
+    #[command(after_help = "Example: needlebench needle insert guide/examples/needle.toml")]
+    Needle(NeedleArguments),
     /// List collision pairs, enabled or disabled, with reasons; check an SRDF.
     #[command(after_help = "Example: needlebench pairs scenarios/table3.toml --srdf arm.srdf")]
     Pairs(PairsArguments),
@@ -274,6 +277,7 @@ fn carried_out(command: Command) -> Result<ExitStatus, Failure> {
         Command::RecordPlan(arguments) => command::record_plan(&arguments),
         Command::Replay(arguments) => command::replay(&arguments),
         Command::Judge(arguments) => command::judge(&arguments),
+        Command::Needle(arguments) => command::needle(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Servo(arguments) => command::servo(&arguments),
         Command::Report(arguments) => command::report(&arguments),

@@ -19,6 +19,6 @@ mod renamed;
 mod xacro;
 
 pub use cli::{command_line, invoke, main, main_with};
-pub use command::KinematicArm;
+pub use command::{KinematicArm, needle_case_schema};
 pub use findings::findings_text;
 pub use host::Invocation;

@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, Json, has_keys, holds, mujoco_is_ready};
 
-const COMMANDS: [&str; 23] = [
+const COMMANDS: [&str; 24] = [
     "init",
     "suggest",
     "run",
@@ -18,6 +18,7 @@ const COMMANDS: [&str; 23] = [
     "iso9283",
     "plan-excitation",
     "replay",
+    "needle",
     "pairs",
     "paper",
     "report",

@@ -54,6 +54,7 @@ fn keys_of_examples_exist() {
         needlebench_scenario::study::study_schema(),
         needlebench_robot::arm::data::arm_schema(),
         needlebench_scenario::marker_list_schema(),
+        needlebench::needle_case_schema(),
     ];
     let mut seen = 0;
     for chapter in chapters() {
