@@ -57,9 +57,9 @@ impl DrawnNeedle {
 
     /// How far it is off a goal's axis at skin and tip, m, towards where its bevel pushes it.
     pub(crate) fn sizes_m(&self, goal: &Goal) -> [f64; 2] {
-        let Some(path) = &goal.needle_path else {
-            return [0.0; 2];
-        };
+        let path = goal.needle_path.as_ref();
+        let path =
+            path.expect("goals of a scenario whose needle is in tissue are resolved with its way");
         let stand_off_m = goal.standoff_m.unwrap_or(0.0);
         let bends_m = self.needle.bends_m(&self.draw, path, stand_off_m);
         let [at_skin, at_tip] = bends_m.expect("tried with the medians when the goal was resolved");

@@ -1,6 +1,7 @@
 //! The needle: how it bends.
 
 use needlebench_input::{Finding, TomlText};
+use needlebench_insertion::{Tissue, WALL_FORCE_N};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -149,12 +150,12 @@ impl Default for NeedleBlock {
 impl Default for ForcesBlock {
     fn default() -> Self {
         Self {
-            wall_n: 0.0855,
-            wall_spread: 1.4,
+            wall_n: WALL_FORCE_N.median,
+            wall_spread: WALL_FORCE_N.spread,
             living: 1.0,
-            fat_share: 0.6,
-            lung_share: 0.25,
-            lesion_share: 1.0,
+            fat_share: Tissue::Fat.force_share().median,
+            lung_share: Tissue::Lung.force_share().median,
+            lesion_share: Tissue::Lesion.force_share().median,
         }
     }
 }
@@ -162,12 +163,16 @@ impl Default for ForcesBlock {
 impl Default for StiffnessBlock {
     fn default() -> Self {
         Self {
-            fat_kn_m2: 5.0,
-            wall_kn_m2: 20.0,
-            lung_kn_m2: 2.0,
-            lesion_kn_m2: 20.0,
+            fat_kn_m2: median_kn_m2(Tissue::Fat),
+            wall_kn_m2: median_kn_m2(Tissue::Wall),
+            lung_kn_m2: median_kn_m2(Tissue::Lung),
+            lesion_kn_m2: median_kn_m2(Tissue::Lesion),
         }
     }
+}
+
+fn median_kn_m2(tissue: Tissue) -> f64 {
+    tissue.stiffness_n_m2().median * 1e-3
 }
 
 /// The bevel's direction is not known.
