@@ -87,7 +87,7 @@ fn row(file: &str, text: &str, line: Range<usize>, before_m: Option<f64>) -> Res
     let depth_mm = number(0, depth, DEEPEST_MM)?;
     let bend_mm = number(1, bend, MOST_MM)?;
     let (depth_m, bend_m) = (1e-3 * depth_mm, 1e-3 * bend_mm);
-    if !(depth_m > before_m.unwrap_or(0.0)) {
+    if depth_m <= before_m.unwrap_or(0.0) {
         let after = match before_m {
             Some(before_m) => format!("after {} mm", super::setup::in_mm(before_m)),
             None => "at the first row".to_owned(),

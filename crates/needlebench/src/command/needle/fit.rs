@@ -172,18 +172,20 @@ pub(super) fn fit(arguments: &FitArguments) -> Result<ExitStatus, Failure> {
     } else {
         let mut text = text(&answer);
         if let Some(path) = &arguments.output {
-            let written = match answer.identifiable {
-                true => "for scenarios",
-                false => "not written",
+            let written = if answer.identifiable {
+                "for scenarios"
+            } else {
+                "not written"
             };
             // Writing to a String cannot fail.
             let _ = write!(text, "\n{written}: {}", shown(path));
         }
         print_text(&text)?;
     }
-    Ok(match answer.identifiable {
-        true => ExitStatus::Success,
-        false => ExitStatus::CriterionFailed,
+    Ok(if answer.identifiable {
+        ExitStatus::Success
+    } else {
+        ExitStatus::CriterionFailed
     })
 }
 
@@ -349,7 +351,8 @@ fn answer(
     }
     answer.force_n = Some(force_n);
     answer.force_interval_95_n = Some([low_n, high_n]);
-    if !(low_n > 0.0) {
+    let is_above_0 = low_n > 0.0;
+    if !is_above_0 {
         answer.reason = Some(if high_n < 0.0 {
             "the bends are towards the bevel's face: give them towards its long side".to_owned()
         } else {

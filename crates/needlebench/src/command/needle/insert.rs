@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use needlebench_input::Finding;
-use needlebench_insertion::{Holder, Insertion, InsertionError, Point, Slip, WARNED_SLOPE, insert};
+use needlebench_insertion::{
+    Holder, Insertion, InsertionError, Point, Slip, Tissue, WARNED_SLOPE, insert,
+};
 use needlebench_report::write_atomically;
 use needlebench_show::{Cell, CellAlignment, plain_table};
 use serde::Serialize;
@@ -119,6 +121,7 @@ struct LayerAnswer {
 }
 
 #[derive(Debug, Serialize)]
+#[expect(clippy::struct_field_names, reason = "names end in their unit")]
 struct SlipAnswer {
     from_m: f64,
     by_m: [f64; 2],
@@ -183,7 +186,7 @@ fn answer(path: &Path, case: &Case) -> Result<InsertAnswer, InsertionError> {
     ) in ends.zip(&case.of_layers)
     {
         of_layers.push(LayerAnswer {
-            tissue: tissue.map(|tissue| tissue.name()),
+            tissue: tissue.map(Tissue::name),
             from_m,
             to_m,
             stiffness_n_m2: layer.stiffness_n_m2,

@@ -63,13 +63,13 @@ impl Sizes {
                 ));
             }
             (None, None) => return Err(wrong("gauge", "the needle has no size", SIZE)),
-            (Some(number), None) => match Gauge::new(number) {
-                Some(gauge) => gauge.needle(),
-                None => {
+            (Some(number), None) => {
+                let unknown = || {
                     let message = format!("a gauge of {number} is not in the chart");
-                    return Err(wrong("gauge", message, SIZE));
-                }
-            },
+                    wrong("gauge", message, SIZE)
+                };
+                Gauge::new(number).ok_or_else(unknown)?.needle()
+            }
             (None, Some(outer_mm)) => {
                 if !self.has_stylet && self.inner_mm.is_none() {
                     return Err(wrong(
@@ -146,7 +146,7 @@ impl Hold {
                         "the length of the needle from hub to tip",
                     )
                 })?;
-                if !(1e-3 * length_mm > depth_m) {
+                if 1e-3 * length_mm <= depth_m {
                     let message = format!(
                         "the needle is {} mm long, and its tip is to be {} mm behind the skin",
                         written(length_mm),
