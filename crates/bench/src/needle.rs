@@ -129,7 +129,7 @@ fn summary_of(
     } else {
         (-p95_m, -p05_m)
     };
-    let mut text = format!(
+    let bends = format!(
         "needle {} G, {}, {stylet}: bends {} mm {side} (90 % of needles {} to {})",
         report.gauge,
         report.tip,
@@ -137,27 +137,24 @@ fn summary_of(
         mm(least_m),
         mm(most_m)
     );
-    if let Some(before_m) = report.bend_at_pleura_m {
-        text.push_str(&format!(
-            ", {} mm of it before the lung",
-            mm(before_m.abs())
-        ));
-    }
-    if let Some(turned) = report.turned {
-        text.push_str(&format!(
+    let before_lung = report
+        .bend_at_pleura_m
+        .map(|before_m| format!(", {} mm of it before the lung", mm(before_m.abs())));
+    let turned = report.turned.map(|turned| {
+        format!(
             "; turned by 180 deg at {:.0} mm: RMS {} instead of {} mm",
             turned.at_m * 1e3,
             mm(turned.rms_m),
             mm(rms_m)
-        ));
-    }
-    if let Some(aimed_m) = report.aimed_rms_m {
-        text.push_str(&format!("; aimed against it: RMS {} mm", mm(aimed_m)));
-    }
-    if report.largest_slope > WARNED_SLOPE {
-        text.push_str("; it bends more than its model is for: a rough figure");
-    }
-    text
+        )
+    });
+    let aimed = report
+        .aimed_rms_m
+        .map(|aimed_m| format!("; aimed against it: RMS {} mm", mm(aimed_m)));
+    let is_far = report.largest_slope > WARNED_SLOPE;
+    let rough = is_far.then(|| "; it bends more than its model is for: a rough figure".to_owned());
+    let parts = [Some(bends), before_lung, turned, aimed, rough];
+    parts.into_iter().flatten().collect()
 }
 
 /// Sides of a patient along the axes of the phantom frame, forwards and backwards.

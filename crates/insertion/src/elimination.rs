@@ -148,8 +148,8 @@ impl Elimination {
         let inverse = inverse(&(self.stiffness + element.k11));
         let [of_first, of_second] = element.loads();
         let mut near = self.right;
-        for plane in 0..2 {
-            let load = of_first[0] * path[0][plane] + of_second[0] * path[1][plane];
+        for (plane, (first, second)) in path[0].into_iter().zip(path[1]).enumerate() {
+            let load = of_first[0] * first + of_second[0] * second;
             near.column_mut(plane).axpy(1.0, &load, 1.0);
         }
         (inverse * near, -(inverse * element.k12))

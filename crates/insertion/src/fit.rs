@@ -119,7 +119,7 @@ pub fn fit_force(
             .map(|(a, b)| (b - a) / step)
             .collect();
         let steep: f64 = slopes.iter().map(|slope: &f64| slope * slope).sum();
-        if !(steep > 0.0) {
+        if steep.is_nan() || steep <= 0.0 {
             return Err(FitError::NotIdentifiable);
         }
         let off = here

@@ -197,7 +197,7 @@ impl<'c> Case<'c> {
             {
                 return Err(InsertionError::Guide { length_m, play_m });
             }
-            Holder::Hub(length_m) if !(length_m > depth_m) => {
+            Holder::Hub(length_m) if length_m.is_nan() || length_m <= depth_m => {
                 return Err(InsertionError::Short { length_m, depth_m });
             }
             _ => {}
@@ -370,12 +370,11 @@ impl<'c> Case<'c> {
         depth_m: f64,
     ) -> Elimination {
         let mut first = 0;
-        let mut known = match self.before_skin(depth_m) {
-            Some(before) => Elimination::first(&before, self.rotation_nm(), [[0.0; 2]; 2]),
-            None => {
-                first = 1;
-                Elimination::first(&self.elements[0], self.rotation_nm(), path(0))
-            }
+        let mut known = if let Some(before) = self.before_skin(depth_m) {
+            Elimination::first(&before, self.rotation_nm(), [[0.0; 2]; 2])
+        } else {
+            first = 1;
+            Elimination::first(&self.elements[0], self.rotation_nm(), path(0))
         };
         for at in first..node {
             known = known.next(&self.elements[at], path(at));
@@ -398,7 +397,7 @@ impl<'c> Case<'c> {
         // What is before each node, from the skin on.
         let has_stand_off = self.before_skin(depth_m).is_some();
         let mut all: Vec<Elimination> = Vec::with_capacity(last + 1);
-        let first = if has_stand_off { 0 } else { 1 };
+        let first = usize::from(!has_stand_off);
         all.push(self.before(moved, first, depth_m));
         for at in first..last {
             all.push(all[at - first].next(&self.elements[at], moved(at)));

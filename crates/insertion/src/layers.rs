@@ -86,7 +86,7 @@ impl Layers {
                     stiffness_n_m2,
                 });
             }
-            if !(force_n.abs() <= FORCE_N) {
+            if force_n.is_nan() || force_n.abs() > FORCE_N {
                 return Err(LayersError::Force { number, force_n });
             }
             end_m += length_m;

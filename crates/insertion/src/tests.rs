@@ -96,7 +96,7 @@ fn far_in_one_tissue_the_path_is_a_circle() {
     for (number, stiffness) in [(18, 2e4), (22, 2e4), (22, 1.5e5), (20, 2e3)] {
         let needle = gauge(number);
         let ei = needle.bending_stiffness_nm2();
-        let lambda = (stiffness / (4.0 * ei)).powf(0.25);
+        let lambda = libm::pow(stiffness / (4.0 * ei), 0.25);
         let tissue = layers(&[[0.4, stiffness, 0.05]]);
         let done = insert(&needle, &guide(0.0), 0.01, &tissue, &bevel(EAST)).unwrap();
         let count = done.path_m.len();
@@ -335,8 +335,9 @@ fn what_is_no_insertion_is_refused() {
 
 fn any_layers() -> impl Strategy<Value = Vec<[f64; 3]>> {
     let layer = (5e-3..3e-2, 0.0..1.0, 0.01..0.15);
-    let layer = layer
-        .prop_map(|(length_m, share, force_n)| [length_m, 500.0 * 320.0_f64.powf(share), force_n]);
+    let layer = layer.prop_map(|(length_m, share, force_n)| {
+        [length_m, 500.0 * libm::pow(320.0, share), force_n]
+    });
     proptest::collection::vec(layer, 1..6)
 }
 
@@ -365,7 +366,7 @@ proptest! {
         let of = |towards| insert(&needle, &holder, 0.01, &tissue, &bevel(towards)).unwrap().tip_m();
         let [along, across] = of(EAST);
         prop_assert_eq!(across, 0.0);
-        let turned = [angle.cos(), angle.sin()];
+        let turned = [libm::cos(angle), libm::sin(angle)];
         let [y, z] = of(turned);
         prop_assert!((y - along * turned[0]).abs() < 1e-12 && (z - along * turned[1]).abs() < 1e-12);
         let [y, z] = of([-turned[0], -turned[1]]);
@@ -401,6 +402,11 @@ fn by_links(
         at.map_or(0.0, |at| layers.all()[at].stiffness_n_m2)
     };
     let total_m = stand_off_m + layers.depth_m();
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "some hundred links"
+    )]
     let count = (total_m / link_m).round() as usize;
     // What was cut: places of the tip, x ascending.
     let mut cut: Vec<[f64; 2]> = vec![[stand_off_m, 0.0]];
@@ -424,8 +430,8 @@ fn by_links(
         for round in 0..40 {
             let (mut x, mut y) = (vec![0.0], vec![0.0]);
             for angle in &angles {
-                x.push(x[x.len() - 1] + link_m * angle.cos());
-                y.push(y[y.len() - 1] + link_m * angle.sin());
+                x.push(x[x.len() - 1] + link_m * libm::cos(*angle));
+                y.push(y[y.len() - 1] + link_m * libm::sin(*angle));
             }
             let mut gradient = DVector::<f64>::zeros(number);
             let mut hessian = DMatrix::<f64>::zeros(number, number);
@@ -446,7 +452,7 @@ fn by_links(
                     hessian[(j, j - 1)] -= spring;
                     hessian[(j - 1, j)] -= spring;
                 }
-                gradient[j] -= force * link_m * angles[j].cos();
+                gradient[j] -= force * link_m * libm::cos(angles[j]);
             }
             for node in 1..number {
                 let depth_m = x[node] - stand_off_m;
@@ -462,7 +468,7 @@ fn by_links(
                     };
                 let (rest, slope) = path(&cut, x[node]);
                 let off = y[node] - rest;
-                let by = |j: usize| link_m * (angles[j].cos() + slope * angles[j].sin());
+                let by = |j: usize| link_m * (libm::cos(angles[j]) + slope * libm::sin(angles[j]));
                 for i in 0..node {
                     gradient[i] += weight * off * by(i);
                     for j in 0..node {
@@ -480,8 +486,8 @@ fn by_links(
         }
         let (mut x, mut y) = (0.0, 0.0);
         for angle in &angles {
-            x += link_m * angle.cos();
-            y += link_m * angle.sin();
+            x += link_m * libm::cos(*angle);
+            y += link_m * libm::sin(*angle);
         }
         end = [x, y];
         cut.push(end);

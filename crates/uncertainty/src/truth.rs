@@ -239,14 +239,11 @@ impl Layout {
                         add(2, Variable::Uniform);
                     }
                     Source::Imaging => add(3, Variable::Normal),
-                    Source::Needle => match imperfections.tissue() {
-                        None => add(2, Variable::Normal),
-                        Some(_) => {
-                            add(DrawnNeedle::NORMALS, Variable::Normal);
-                            add(1, Variable::Uniform);
-                        }
-                    },
-                    Source::Indentation => add(2, Variable::Normal),
+                    Source::Needle if imperfections.tissue().is_some() => {
+                        add(DrawnNeedle::NORMALS, Variable::Normal);
+                        add(1, Variable::Uniform);
+                    }
+                    Source::Needle | Source::Indentation => add(2, Variable::Normal),
                     Source::Breathing => {
                         add(1, Variable::Normal);
                         add(2, Variable::Uniform);

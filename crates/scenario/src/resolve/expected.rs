@@ -75,15 +75,11 @@ impl RealThings<'_> {
             })
         });
         let resolved = resolve_imperfections(
-            self.toml,
+            self,
             section,
             needle_place,
-            self.base,
-            self.robot,
             arms.as_deref(),
             elasticity.transpose()?,
-            self.tool,
-            self.timestep_ms,
         )?;
         notes.extend(arms.iter().flat_map(|arms| arms.notes.iter().cloned()));
         Ok(resolved)

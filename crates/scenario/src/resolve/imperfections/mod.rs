@@ -17,13 +17,11 @@ pub use needlebench_cell::GearTwist;
 
 pub use super::arm_values::JointFriction;
 use super::arm_values::{joint_friction, set_point_period_ms};
+use super::expected::RealThings;
 use crate::scenario::ImperfectionsSection;
 pub use crate::scenario::{ArmClass, BreathState, CalibrationBlock};
 use needle::needle_bending;
-use needlebench_cell::Tool;
-use needlebench_input::{Finding, ModelSource, TomlText};
-use needlebench_robot::LoadedRobot;
-use std::path::Path;
+use needlebench_input::{Finding, ModelSource};
 use std::sync::Arc;
 
 /// The imperfections in SI units, with what they name resolved.
@@ -183,19 +181,23 @@ pub struct Breathing {
 /// Samples of the Monte Carlo in a run unless the scenario says.
 const DEFAULT_BUDGET_SAMPLES: u32 = 2000;
 
-/// Resolves the section, with what it leaves to the robot's arm. `arms` are the real arms of its
-/// calibration block; the needle's block stands at `needle_place`, and files are relative to `base`.
+/// Resolves the section, with what it leaves to the robot's arm. `arms` are the real arms of its calibration block; the
+/// needle's block stands at `needle_place`.
 pub(crate) fn resolve_imperfections(
-    toml: &TomlText<'_>,
+    real: &RealThings<'_>,
     section: &ImperfectionsSection,
     needle_place: &str,
-    base: &Path,
-    robot: &LoadedRobot,
     arms: Option<&RealArms>,
     elasticity: Option<Elasticity>,
-    tool: &Tool,
-    timestep_ms: f64,
 ) -> Result<Imperfections, Finding> {
+    let RealThings {
+        toml,
+        robot,
+        tool,
+        base,
+        timestep_ms,
+        ..
+    } = *real;
     let bore_clearance_m = tool.bore_m - tool.needle.outer_diameter_m;
     let joints = Joints::from_column_slice;
     let breathing = section.breathing.as_ref().map(|block| Breathing {

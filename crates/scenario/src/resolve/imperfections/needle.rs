@@ -19,7 +19,7 @@ pub enum NeedleBending {
     /// In air.
     Cantilever(Cantilever),
     /// In tissue.
-    Tissue(TissueNeedle),
+    Tissue(Box<TissueNeedle>),
 }
 
 /// A needle in air that is clamped at the guide's exit, under a force across its tip.
@@ -238,7 +238,7 @@ pub(super) fn needle_bending(
         forces.lesion_share,
     ];
     let kinds = TissueNeedle::KINDS;
-    Ok(NeedleBending::Tissue(TissueNeedle {
+    Ok(NeedleBending::Tissue(Box::new(TissueNeedle {
         needle,
         guide: Guide {
             length_m: tool.guide_length_m(),
@@ -263,7 +263,7 @@ pub(super) fn needle_bending(
             median: shares[index],
             ..kinds[index].force_share()
         }),
-    }))
+    })))
 }
 
 /// The force that a file of `needle fit` has.
