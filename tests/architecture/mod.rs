@@ -322,6 +322,7 @@ const OWNERS: [(&str, &[&str]); 21] = [
             "cell",
             "credibility",
             "input",
+            "needlebench",
             "phantom",
             "robot",
             "scenario",

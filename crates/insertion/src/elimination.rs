@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Matrix2x4, RowVector4, Vector2};
 
 use crate::element::Element;
 
-/// Right sides: the two planes across the needle, a displacement of 1 m at the exit, a moment of 1 N m there.
+/// Right sides: the two planes lateral to the needle, a displacement of 1 m at the exit, a moment of 1 N m there.
 pub(crate) const EXIT: usize = 2;
 pub(crate) const MOMENT: usize = 3;
 

@@ -27,7 +27,7 @@ pub const WARNED_SLOPE: f64 = 0.1;
 /// The tip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bevel {
-    /// Where the force of a layer pushes the tip: a unit vector across the needle, away from the bevel's face; shorter for a
+    /// Where the force of a layer pushes the tip: a unit vector lateral to the needle, away from the bevel's face; shorter for a
     /// tip that is pushed less.
     pub towards: [f64; 2],
     /// Angle of the face against the axis, rad.
@@ -53,7 +53,7 @@ pub struct Insertion {
     pub exit_slope: [f64; 2],
 }
 
-/// Tissue that moves across the needle after it was inserted.
+/// Tissue that moves lateral to the needle after it was inserted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slip {
     /// From this depth on, m.

@@ -117,7 +117,7 @@ pub(crate) struct Glance {
     pub surplus: f64,
     /// The solids whose clearance it is, unless the joints decide it.
     pub decided_by: Option<Couple>,
-    /// Of one that works and whose merit was asked for: by class the solids that are nearest to each other, and how near,
+    /// Of a feasible one whose merit was asked for: by class the solids that are nearest to each other, and how near,
     /// m, where that is nearer than what is wanted.
     nearest: [(f64, Option<Couple>); CLASS_COUNT],
     /// That of none if it does not work.
@@ -231,7 +231,7 @@ impl<'p> Sweep<'p> {
         self.look(Asked::Surplus(level), at, least)
     }
 
-    /// What [`Sweep::keeps_at`] says, of a member that works and of which a glance said so: its clearances are known as far
+    /// What [`Sweep::keeps_at`] says, of a feasible member of which a glance said so: its clearances are known as far
     /// as they fall short of what is wanted.
     pub(crate) fn keeps_by(&self, level: Level, at: &At, glance: &Glance) -> Option<Glance> {
         let (solution, _) = at.found.as_ref().filter(|_| glance.works)?;

@@ -9,7 +9,7 @@ use needlebench_robot::LoadedRobot;
 
 use super::arm_values::gear_twist;
 use super::gravity::makers_gravity;
-use super::imperfections::{Elasticity, Imperfections, resolve_imperfections};
+use super::imperfections::{Elasticity, Given, Imperfections, resolve_imperfections};
 use super::library::ModelLibrary;
 use crate::scenario::{ArmClass, BreathState, IN_EXPECTED, ImperfectionsSection, Scenario};
 
@@ -74,13 +74,16 @@ impl RealThings<'_> {
                 spread: elastic.spread,
             })
         });
-        let resolved = resolve_imperfections(
-            self,
-            section,
+        let given = Given {
+            toml: self.toml,
             needle_place,
-            arms.as_deref(),
-            elasticity.transpose()?,
-        )?;
+            base: self.base,
+            robot: self.robot,
+            tool: self.tool,
+            timestep_ms: self.timestep_ms,
+        };
+        let resolved =
+            resolve_imperfections(&given, section, arms.as_deref(), elasticity.transpose()?)?;
         notes.extend(arms.iter().flat_map(|arms| arms.notes.iter().cloned()));
         Ok(resolved)
     }

@@ -30,7 +30,7 @@ fn refused(goal: &str, more: &str) -> Finding {
 #[test]
 fn a_needle_in_tissue_passes_what_is_between_skin_and_tip() {
     for place in ["expected", "imperfections"] {
-        let block = format!("[{place}.needle]\nmodel = \"tissue\"\nbevel = \"spine\"\n");
+        let block = format!("[{place}.needle]\nmodel = \"tissue\"\nbevel = \"liver\"\n");
         let resolved = resolve(GOAL, &block).unwrap();
         let goal = &resolved.goals[0];
         let path = goal.needle_path.as_ref().unwrap();
@@ -169,7 +169,8 @@ fn a_measured_force_is_read_with_its_interval() {
     // Ends of a lognormal's interval: 1.96 standard deviations to either side.
     let spread = libm::pow(0.072 / 0.05, 1.0 / (2.0 * 1.959_963_984_540_054));
     assert!((needle.wall_force_n.spread / spread - 1.0).abs() < 1e-12);
-    assert_eq!(expected.sources.len(), 1);
+    let name = file.display().to_string();
+    assert!(expected.sources.iter().any(|source| source.file == name));
     write("tip_force_n = 0.06\ninterval_95_n = [-0.01, 0.12]\n");
     let findings = resolve(GOAL, &block).expect_err("it reaches 0");
     assert_eq!(

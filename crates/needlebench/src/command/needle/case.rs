@@ -35,7 +35,7 @@ struct CaseFile {
     /// What it passes, from the skin inwards.
     #[schemars(length(min = 1, max = 100))]
     layers: Vec<LayerSection>,
-    /// Tissue that moves across the needle afterwards.
+    /// Tissue that moves lateral to the needle afterwards.
     #[serde(default)]
     slip: Option<SlipSection>,
 }
@@ -181,7 +181,7 @@ struct SlipSection {
     /// From this depth on, mm.
     #[schemars(range(min = 0.0, max = 2000.0))]
     from_mm: f64,
-    /// By this across the needle, along y and z, mm.
+    /// By this lateral to the needle, along y and z, mm.
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
     by_mm: [f64; 2],
 }

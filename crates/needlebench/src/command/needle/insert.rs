@@ -30,7 +30,7 @@ The case is a TOML file:
   [tip]        point (bevel, symmetric or rolled), bevel_deg, towards_deg, turn_at_mm
   [[layers]]   length_mm, and a tissue (fat, wall, lung, lesion, gas, fluid) or
                stiffness_kn_m2 and force_n, which replace those of the tissue
-  [slip]       from_mm, by_mm: tissue that moves across the needle afterwards
+  [slip]       from_mm, by_mm: tissue that moves lateral to the needle afterwards
 
 x is the guide's axis, from its exit on, y and z are across; towards_deg 0 is y, 90 is z.
 

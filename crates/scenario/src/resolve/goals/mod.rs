@@ -16,6 +16,7 @@ use needlebench_kinematics::Pose;
 use needlebench_kinematics::ik::Configuration;
 use serde::{Deserialize, Serialize};
 
+use super::imperfections::NeedlePath;
 use super::phantom::{Corners, PlacedPhantom};
 use crate::scenario::{EVERY_CONFIGURATION, GoalSection, NeedleBlock};
 use by_flange::from_flange_pose;
@@ -24,7 +25,6 @@ pub use by_points::direction;
 use by_points::from_entry_and_target;
 pub(crate) use by_points::target_inside;
 use checks::{check_place, check_target};
-pub use needle_path::NeedlePath;
 pub(crate) use needle_path::check_insertion;
 
 /// Angle of the guide about the needle.

@@ -3,26 +3,13 @@
 use nalgebra::{Point3, Vector3};
 use needlebench_input::{Finding, TomlText, nearest_name};
 use needlebench_kinematics::Pose;
-use needlebench_phantom::{PassedLayer, Phantom, Tissue};
+use needlebench_phantom::{Phantom, Tissue};
 
 use needlebench_insertion::WARNED_SLOPE;
 
 use super::Goal;
-use crate::resolve::imperfections::TissueNeedle;
+use crate::resolve::imperfections::{NeedlePath, TissueNeedle};
 use crate::scenario::{BevelFace, NeedleBlock};
-
-/// The needle's way through tissue, for a needle that bends in it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NeedlePath {
-    /// Tissues from the skin to the needle's tip, the outermost first.
-    pub layers: Vec<PassedLayer>,
-    /// Unit vector across the needle towards which a bevelled tip is pushed, away from its face: x and y of the guide's
-    /// exit at roll 0. None where the direction is not known.
-    pub pushed_towards: Option<[f64; 2]>,
-    /// Twelve and three on the clock at the hub, of the same: towards the patient's head as near as the needle lets, and a
-    /// quarter further as seen along the insertion.
-    pub clock: [[f64; 2]; 2],
-}
 
 /// Least sine of the angle between a needle and a direction that its bevel is to face.
 const LEAST_SINE: f64 = 0.3;
@@ -114,9 +101,8 @@ pub(super) fn needle_path(
                     goal.name, block.bevel
                 );
                 let finding = text.finding(&key, message);
-                return Err(
-                    finding.hint("choose a direction across the needle, or a time such as `3:00`")
-                );
+                return Err(finding
+                    .hint("choose a direction lateral to the needle, or a time such as `3:00`"));
             }
             Ok(in_guide(-off.normalize()))
         })

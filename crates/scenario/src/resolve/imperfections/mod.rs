@@ -12,16 +12,18 @@ pub use absorbed::AbsorbedSag;
 pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
 pub use localised::{Localisation, Markers, TargetLocalisation};
-pub use needle::{Cantilever, NeedleBending, NeedleDraw, TissueError, TissueNeedle};
+pub use needle::{Cantilever, NeedleBending, NeedleDraw, NeedlePath, TissueError, TissueNeedle};
 pub use needlebench_cell::GearTwist;
 
 pub use super::arm_values::JointFriction;
 use super::arm_values::{joint_friction, set_point_period_ms};
-use super::expected::RealThings;
 use crate::scenario::ImperfectionsSection;
 pub use crate::scenario::{ArmClass, BreathState, CalibrationBlock};
 use needle::needle_bending;
-use needlebench_input::{Finding, ModelSource};
+use needlebench_cell::Tool;
+use needlebench_input::{Finding, ModelSource, TomlText};
+use needlebench_robot::LoadedRobot;
+use std::path::Path;
 use std::sync::Arc;
 
 /// The imperfections in SI units, with what they name resolved.
@@ -181,23 +183,33 @@ pub struct Breathing {
 /// Samples of the Monte Carlo in a run unless the scenario says.
 const DEFAULT_BUDGET_SAMPLES: u32 = 2000;
 
-/// Resolves the section, with what it leaves to the robot's arm. `arms` are the real arms of its calibration block; the
-/// needle's block stands at `needle_place`.
+/// What the sections of a scenario leave to its robot and its tool.
+pub(crate) struct Given<'a> {
+    pub toml: &'a TomlText<'a>,
+    /// Key of the needle's block.
+    pub needle_place: &'a str,
+    /// Folder that files are relative to.
+    pub base: &'a Path,
+    pub robot: &'a LoadedRobot,
+    pub tool: &'a Tool,
+    pub timestep_ms: f64,
+}
+
+/// Resolves the section. `arms` are the real arms of its calibration block.
 pub(crate) fn resolve_imperfections(
-    real: &RealThings<'_>,
+    given: &Given<'_>,
     section: &ImperfectionsSection,
-    needle_place: &str,
     arms: Option<&RealArms>,
     elasticity: Option<Elasticity>,
 ) -> Result<Imperfections, Finding> {
-    let RealThings {
+    let Given {
         toml,
+        needle_place,
+        base,
         robot,
         tool,
-        base,
         timestep_ms,
-        ..
-    } = *real;
+    } = *given;
     let bore_clearance_m = tool.bore_m - tool.needle.outer_diameter_m;
     let joints = Joints::from_column_slice;
     let breathing = section.breathing.as_ref().map(|block| Breathing {

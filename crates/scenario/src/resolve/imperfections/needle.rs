@@ -8,9 +8,9 @@ use needlebench_insertion::{
     Bevel, Factor, Guide, Holder, Insertion, InsertionError, Layers, LayersError, Needle, Point,
     Tissue,
 };
+use needlebench_phantom::PassedLayer;
 use serde::Deserialize;
 
-use crate::resolve::goals::NeedlePath;
 use crate::scenario::{NeedleBlock, NeedleModel, NeedleTip};
 
 /// Bending of the needle.
@@ -37,6 +37,19 @@ impl Cantilever {
     pub fn compliance_m_per_n(&self, depth_m: f64, length_m: f64) -> f64 {
         depth_m * depth_m * (3.0 * length_m - depth_m) / (6.0 * self.rigidity_nm2)
     }
+}
+
+/// The needle's way through tissue, for a needle that bends in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NeedlePath {
+    /// Tissues from the skin to the needle's tip, the outermost first.
+    pub layers: Vec<PassedLayer>,
+    /// Unit vector lateral to the needle towards which a bevelled tip is pushed, away from its face: x and y of the guide's
+    /// exit at roll 0. None where the direction is not known.
+    pub pushed_towards: Option<[f64; 2]>,
+    /// Twelve and three on the clock at the hub, of the same: towards the patient's head as near as the needle lets, and a
+    /// quarter further as seen along the insertion.
+    pub clock: [[f64; 2]; 2],
 }
 
 /// A needle that cuts its path through tissue, and what is known of its forces.
@@ -80,7 +93,7 @@ impl TissueNeedle {
         }
     }
 
-    /// What of an insertion the solver is asked for: along one axis across the needle, towards which the tip is pushed.
+    /// What of an insertion the solver is asked for: along one axis lateral to the needle, towards which the tip is pushed.
     fn inserted<T>(
         &self,
         draw: &NeedleDraw,
