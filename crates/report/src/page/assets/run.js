@@ -435,7 +435,9 @@ class RunPage {
     view.rod('needle', behind, target, 0.0012, [0, 0.45, 0.32, 1]);
     // What tissue makes of it: the median needle.
     const bent = this.goal.needle?.path_in_world_m ?? [];
-    bent.slice(1).forEach((point, at) => view.rod('needle', bent[at], point, 0.0009, [0.8, 0.1, 0.1, 1], true));
+    bent.slice(1).forEach((point, at) => {
+      view.rod('needle', bent[at], point, 0.0009, [0.8, 0.1, 0.1, 1], true);
+    });
     if (bent.length) view.label('needle', 'bent', bent[bent.length - 1]);
     view.ball('needle', target, 0.004, [0.84, 0.37, 0, 1]);
     view.label('needle', 'target', target);
