@@ -218,6 +218,7 @@ pub(crate) fn route_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<R
         distance_m: judged.distance_m,
         margin_m: judged.margin_m,
         kept: judged.is_kept(),
+        is_bent: judged.nearest.is_bent,
     })
 }
 
@@ -234,7 +235,7 @@ pub(crate) fn goal_report(
     let route = resolved
         .phantom
         .as_ref()
-        .and_then(|placed| needle_route(&resolved.cell, placed, goal))
+        .and_then(|placed| needle_route(resolved, placed, goal))
         .map(|nearest| route_clearance(&nearest.part.name, &nearest.separation));
     GoalReport {
         name: goal.name.clone(),

@@ -1,13 +1,13 @@
 //! How a goal's needle bends in tissue, and what can be done about it.
 
-use nalgebra::{Point3, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 use needlebench_evaluation::report::{
     BendSummary, BevelDirection, NeedleAlternative, NeedleLayer, NeedleReport, TurnedNeedle,
 };
-use needlebench_insertion::{Gauge, Guide, Insertion, Point, Tissue, WARNED_SLOPE};
+use needlebench_insertion::{Gauge, Guide, Point, Tissue, WARNED_SLOPE};
 use needlebench_numerics::order::quantile_position;
 use needlebench_planning::bent_route;
-use needlebench_scenario::imperfections::TissueNeedle;
+use needlebench_scenario::imperfections::{TissueNeedle, bend_at_m, bends_along_m};
 use needlebench_scenario::{Goal, NeedlePath, PlacedPhantom, ResolvedScenario};
 use needlebench_uncertainty::{DRAWS, drawn_bends_m};
 
@@ -17,9 +17,6 @@ const SEARCH_DRAWS: usize = 64;
 /// Depths of a turn that are tried, as shares of the way.
 const TURNS: std::ops::RangeInclusive<u32> = 4..=19;
 const TURN_STEPS: f64 = 20.0;
-
-/// Points of a bent needle that distances are measured between, m apart.
-const STEP_M: f64 = 5e-3;
 
 /// Longer guides and smaller stand-offs that are tried, m.
 const GUIDES_M: [f64; 2] = [30e-3, 80e-3];
@@ -34,28 +31,17 @@ pub(crate) fn needle_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<
     let medians = needle.medians();
     let inserted = needle.insert(&medians, path, stand_off_m).ok()?;
     let has_direction = needle.tip == Point::Bevel;
-    let towards = path.pushed_towards.filter(|_| has_direction);
+    let towards = needle.pushed_towards(path);
+    let path_m = bends_along_m(&inserted);
     let sizes_m = sizes_m(needle, goal, DRAWS);
     let tool = &resolved.cell.tool;
-    let layers = path.layers.iter().map(|layer| {
-        let index = TissueNeedle::KINDS
-            .iter()
-            .position(|kind| *kind == layer.tissue);
-        let [stiffness_n_m2, force_n] = index.map_or([0.0; 2], |index| {
-            let force_n = medians.wall_force_n * needle.living * needle.tip.share();
-            let (stiffness, share) = (medians.stiffness_n_m2[index], medians.force_shares[index]);
-            let outer_m = needle.needle.outer_m;
-            let median = layer
-                .tissue
-                .layer_of(layer.length_m, outer_m, stiffness, force_n, share);
-            [median.stiffness_n_m2, median.force_n]
-        });
-        NeedleLayer {
-            tissue: layer.tissue.name(),
-            length_m: layer.length_m,
-            stiffness_n_m2,
-            force_n,
-        }
+    let with_forces = needle.layers(&medians, path).ok()?;
+    let layers = path.layers.iter().zip(with_forces.all());
+    let layers = layers.map(|(passed, layer)| NeedleLayer {
+        tissue: passed.tissue.name(),
+        length_m: layer.length_m,
+        stiffness_n_m2: layer.stiffness_n_m2,
+        force_n: layer.force_n,
     });
     let to_patient =
         placed.world_from_phantom.rotation.inverse() * goal.world_from_guide_exit.rotation;
@@ -82,19 +68,19 @@ pub(crate) fn needle_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<
         bend: summary(&sizes_m),
         bend_at_pleura_m: pleura_m(path).map(|depth_m| bend_at_m(&inserted, depth_m)),
         largest_slope: inserted.largest_slope(),
-        path_in_world_m: towards.map_or_else(Vec::new, |[x, y]| {
-            let points = in_world(goal, &sampled(&inserted), &Vector2::new(x, y)).into_iter();
+        path_in_world_m: towards.map_or_else(Vec::new, |towards| {
+            let points = goal.bent_line(&path_m, towards).into_iter();
             points.map(|point| point.coords.into()).collect()
         }),
-        path_m: sampled(&inserted),
         turned: (has_direction && needle.turn_at_m.is_none()).then(|| turned(needle, goal, path)),
         aimed_rms_m: towards.map(|_| aimed_rms_m(needle, &sizes_m)),
         alternatives: alternatives(resolved, needle, goal),
         faces: if has_direction {
-            faces(resolved, placed, goal, path, &inserted)
+            faces(resolved, placed, goal, path, &path_m)
         } else {
             Vec::new()
         },
+        path_m,
         assumed,
     };
     report.summary = summary_of(&report, needle, pushed_towards);
@@ -129,8 +115,13 @@ fn summary_of(
     } else {
         (-p95_m, -p05_m)
     };
+    let assumed = if needle.is_force_measured {
+        ""
+    } else {
+        "; forces assumed"
+    };
     let bends = format!(
-        "needle {} G, {}, {stylet}: bends {} mm {side} (90 % of needles {} to {})",
+        "needle {} G, {}, {stylet}: bends {} mm {side} (90 % of needles {} to {}{assumed})",
         report.gauge,
         report.tip,
         mm(median_m.abs()),
@@ -220,31 +211,6 @@ fn pleura_m(path: &NeedlePath) -> Option<f64> {
         .iter()
         .position(|layer| layer.tissue == Tissue::Lung)?;
     Some(path.layers[..lung].iter().map(|layer| layer.length_m).sum())
-}
-
-/// How far what a needle has cut is off the axis at a depth, m.
-fn bend_at_m(inserted: &Insertion, depth_m: f64) -> f64 {
-    let depths_m = &inserted.depths_m;
-    let next = depths_m
-        .partition_point(|&each| each < depth_m)
-        .clamp(1, depths_m.len() - 1);
-    let [from_m, to_m] = [depths_m[next - 1], depths_m[next]];
-    let share = ((depth_m - from_m) / (to_m - from_m)).clamp(0.0, 1.0);
-    inserted.path_m[next - 1][0] * (1.0 - share) + inserted.path_m[next][0] * share
-}
-
-/// Depths and bends at steps of a few millimetres.
-fn sampled(inserted: &Insertion) -> Vec<[f64; 2]> {
-    let end_m = inserted.depths_m.last().copied().unwrap_or(0.0);
-    let count = (end_m / STEP_M).ceil().max(1.0);
-    let mut points = Vec::new();
-    let mut number = 0.0;
-    while number <= count {
-        let depth_m = end_m * number / count;
-        points.push([depth_m, bend_at_m(inserted, depth_m)]);
-        number += 1.0;
-    }
-    points
 }
 
 /// The turn that leaves the least.
@@ -355,30 +321,20 @@ fn alternatives(
     all
 }
 
-/// Points of a path, depths and bends, that is bent towards a direction across the guide's exit; world.
-fn in_world(goal: &Goal, path_m: &[[f64; 2]], towards: &Vector2<f64>) -> Vec<Point3<f64>> {
-    let entry = goal.entry_m.unwrap_or(goal.target_m);
-    let across = goal.world_from_guide_exit.rotation * Vector3::new(towards.x, towards.y, 0.0);
-    let at =
-        |[depth_m, bend_m]: &[f64; 2]| entry + goal.axis.into_inner() * *depth_m + across * *bend_m;
-    path_m.iter().map(at).collect()
-}
-
 /// What a needle that is bent as the medians have it keeps away from, for twelve directions of its bevel's face.
 fn faces(
     resolved: &ResolvedScenario,
     placed: &PlacedPhantom,
     goal: &Goal,
     path: &NeedlePath,
-    inserted: &Insertion,
+    path_m: &[[f64; 2]],
 ) -> Vec<BevelDirection> {
-    let path_m = sampled(inserted);
     let [twelve, three] = path.clock.map(Vector2::from);
     let mut found: Vec<BevelDirection> = (1..=12_u32)
         .filter_map(|hour| {
             let (sine, cosine) = libm::sincos(f64::from(hour) * std::f64::consts::TAU / 12.0);
             let towards = -(twelve * cosine + three * sine);
-            let points = in_world(goal, &path_m, &towards);
+            let points = goal.bent_line(path_m, towards.into());
             let nearest = bent_route(&resolved.cell, placed, goal, &points)?;
             Some(BevelDirection {
                 clock: format!("{hour}:00"),

@@ -324,15 +324,20 @@ fn route_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
     }
     let RouteReport { part, tissue, .. } = route;
     let words = part_in_words(part);
+    let bent = if route.is_bent {
+        ", bent by tissue"
+    } else {
+        ""
+    };
     let mm = route.distance_m * 1e3;
     let message = if mm < 0.0 {
         format!(
-            "needle path of goal `{}`: {:.1} mm deep in {words} ({tissue}, `{part}`)",
+            "needle path of goal `{}`{bent}: {:.1} mm deep in {words} ({tissue}, `{part}`)",
             goal.name, -mm
         )
     } else {
         format!(
-            "needle path of goal `{}`: {mm:.1} mm clearance to {words} ({tissue}, `{part}`), {:.1} \
+            "needle path of goal `{}`{bent}: {mm:.1} mm clearance to {words} ({tissue}, `{part}`), {:.1} \
              mm required",
             goal.name,
             limit_m * 1e3

@@ -162,6 +162,9 @@ pub struct RouteReport {
     pub margin_m: f64,
     /// The margin is kept; if not, every configuration is rejected.
     pub kept: bool,
+    /// Whether it is the median needle as tissue bends it that comes so near, and not the straight one.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_bent: bool,
 }
 
 /// How a goal's needle bends in tissue, and what can be done about it: of many needles in many patients, the same draws

@@ -46,13 +46,9 @@ impl Phantom {
         tip: &Point3<f64>,
     ) -> Result<Vec<PassedLayer>, LayersError> {
         let length_m = (tip - entry).norm();
-        let holding = self.parts.iter().filter(|part| part.tissue == Tissue::Bone);
-        for bone in holding {
-            let is_met = !bone.solid.stretches(entry, tip).is_empty();
-            if is_met && !bone.solid.contains(tip) {
-                let name = bone.organ.as_ref().unwrap_or(&bone.name);
-                return Err(LayersError::Bone(name.clone()));
-            }
+        if let Some(bone) = self.bones_met(entry, tip).next() {
+            let name = bone.organ.as_ref().unwrap_or(&bone.name);
+            return Err(LayersError::Bone(name.clone()));
         }
         // Later ones lie in earlier ones.
         let kinds = [Passed::Lung, Passed::Gas, Passed::Fluid, Passed::Lesion];
@@ -101,6 +97,18 @@ impl Phantom {
             );
         }
         Ok(layers)
+    }
+
+    /// The bones that a needle passes, but for those that hold its end; phantom frame.
+    pub fn bones_met(
+        &self,
+        entry: &Point3<f64>,
+        tip: &Point3<f64>,
+    ) -> impl Iterator<Item = &PhantomPart> {
+        let bones = self.parts.iter().filter(|part| part.tissue == Tissue::Bone);
+        bones.filter(|bone| {
+            !bone.solid.stretches(entry, tip).is_empty() && !bone.solid.contains(tip)
+        })
     }
 
     /// The middle of a structure, by the name of an organ or of a part: of the box around its surfaces, phantom frame.

@@ -19,22 +19,22 @@ pub struct RouteClearance<'a> {
     pub part: &'a RouteObstacle,
     /// Signed distance with the needle as A, world.
     pub separation: Separation,
+    /// Whether it is what the needle comes nearest to as tissue bends it, and not on its straight way.
+    pub is_bent: bool,
 }
 
-/// What the planned needle comes nearest to of bones, vessels and organs, from the skin to where it ends;
-/// `None` without a phantom that has any.
+/// What the planned needle comes nearest to of bones, vessels and organs, from the skin to where it ends, straight or as
+/// tissue bends it; `None` without a phantom that has any.
 ///
 /// The organ that contains the target is left out, and the bone whose lesion is aimed at: the needle has to
 /// enter them.
 pub fn needle_route<'a>(
-    cell: &Cell,
+    resolved: &ResolvedScenario,
     placed: &'a PlacedPhantom,
     goal: &Goal,
 ) -> Option<RouteClearance<'a>> {
-    let entered = Entered::new(placed, goal);
-    nearest_of(cell, placed, goal, &entered, |part| {
-        part.tissue != Tissue::Fissure
-    })
+    let passage = Passage::new(resolved, placed, goal);
+    passage.nearest(|part| part.tissue != Tissue::Fissure)
 }
 
 /// Names of the fissures of the lungs that the planned needle touches or crosses, in the order of the
@@ -45,12 +45,11 @@ pub fn crossed_fissures(resolved: &ResolvedScenario, goal: &Goal) -> Vec<String>
     };
     let parts = &placed.phantom.route_obstacles().parts;
     let fissures = parts.iter().filter(|part| part.tissue == Tissue::Fissure);
-    let entered = Entered::new(placed, goal);
+    let passage = Passage::new(resolved, placed, goal);
     let is_crossed = |fissure: &&RouteObstacle| {
-        nearest_of(&resolved.cell, placed, goal, &entered, |part| {
-            part == *fissure
-        })
-        .is_some_and(|nearest| nearest.separation.distance_m - ROUNDING_M <= 0.0)
+        passage
+            .nearest(|part| part == *fissure)
+            .is_some_and(|nearest| nearest.separation.distance_m - ROUNDING_M <= 0.0)
     };
     fissures
         .filter(is_crossed)
@@ -58,25 +57,54 @@ pub fn crossed_fissures(resolved: &ResolvedScenario, goal: &Goal) -> Vec<String>
         .collect()
 }
 
-fn nearest_of<'a>(
-    cell: &Cell,
-    placed: &'a PlacedPhantom,
-    goal: &Goal,
-    entered: &Entered<'_, '_>,
-    wanted: impl Fn(&RouteObstacle) -> bool,
-) -> Option<RouteClearance<'a>> {
-    nearest_along(
-        cell,
-        placed,
-        &[goal.entry_m?, needle_end(goal)],
-        entered,
-        wanted,
-    )
+/// The lines of a goal's needle beside what it is to keep away from.
+struct Passage<'p, 'g> {
+    placed: &'p PlacedPhantom,
+    /// Radius of the needle, m.
+    radius_m: f64,
+    /// From the skin to where it ends; none without a patient.
+    straight: Option<[Point3<f64>; 2]>,
+    /// As tissue bends the median needle: empty where it does not, or where it is not known to which side.
+    bent: Vec<Point3<f64>>,
+    entered: Entered<'p, 'g>,
+}
+
+impl<'p, 'g> Passage<'p, 'g> {
+    fn new(resolved: &ResolvedScenario, placed: &'p PlacedPhantom, goal: &'g Goal) -> Self {
+        let expected = resolved.expected.as_ref();
+        let needle = expected.and_then(|expected| expected.imperfections.tissue());
+        Self {
+            placed,
+            radius_m: needle_radius_m(&resolved.cell),
+            straight: goal.entry_m.map(|entry| [entry, needle_end(goal)]),
+            bent: needle
+                .and_then(|needle| goal.median_line(needle))
+                .unwrap_or_default(),
+            entered: Entered::new(placed, goal),
+        }
+    }
+
+    fn nearest(&self, wanted: impl Fn(&RouteObstacle) -> bool) -> Option<RouteClearance<'p>> {
+        let Self {
+            placed, radius_m, ..
+        } = *self;
+        let along = |points: &[Point3<f64>], is_bent| {
+            nearest_along(radius_m, placed, points, &self.entered, &wanted)
+                .map(|found| RouteClearance { is_bent, ..found })
+        };
+        let straight = along(self.straight.as_ref()?, false);
+        let both = [straight, along(&self.bent, true)].into_iter().flatten();
+        both.reduce(nearer)
+    }
+}
+
+fn needle_radius_m(cell: &Cell) -> f64 {
+    0.5 * cell.tool.needle.outer_diameter_m
 }
 
 /// The same of a needle through points, world.
 fn nearest_along<'a>(
-    cell: &Cell,
+    radius_m: f64,
     placed: &'a PlacedPhantom,
     points: &[Point3<f64>],
     entered: &Entered<'_, '_>,
@@ -91,22 +119,26 @@ fn nearest_along<'a>(
         let (index, separation) = obstacles.solids.nearest_to_segment(
             &ends[0],
             &ends[1],
-            0.5 * cell.tool.needle.outer_diameter_m,
+            radius_m,
             &placed.world_from_phantom,
             counts,
         )?;
         Some(RouteClearance {
             part: &obstacles.parts[index],
             separation,
+            is_bent: false,
         })
     });
-    nearest.reduce(|a, b| {
-        if b.separation.distance_m < a.separation.distance_m {
-            b
-        } else {
-            a
-        }
-    })
+    nearest.reduce(nearer)
+}
+
+/// The first of two, unless the second is nearer.
+fn nearer<'a>(a: RouteClearance<'a>, b: RouteClearance<'a>) -> RouteClearance<'a> {
+    if b.separation.distance_m < a.separation.distance_m {
+        b
+    } else {
+        a
+    }
 }
 
 /// What of bone, vessels and organs a bent needle of a goal comes nearest to, apart from what it has to enter: through
@@ -117,7 +149,8 @@ pub fn bent_route<'a>(
     goal: &Goal,
     points: &[Point3<f64>],
 ) -> Option<RouteClearance<'a>> {
-    nearest_along(cell, placed, points, &Entered::new(placed, goal), |part| {
+    let entered = Entered::new(placed, goal);
+    nearest_along(needle_radius_m(cell), placed, points, &entered, |part| {
         part.tissue != Tissue::Fissure
     })
 }
@@ -230,8 +263,8 @@ pub fn judge_route_beside<'a>(
     })
 }
 
-/// How the planned needle of a goal keeps each margin: bone, vessel and organ, as far as there are any that it
-/// has to keep away from.
+/// How the planned needle of a goal keeps each margin, straight and as tissue bends it: bone, vessel and organ, as far as
+/// there are any that it has to keep away from.
 pub fn judged_tissues<'a>(
     resolved: &ResolvedScenario,
     placed: &'a PlacedPhantom,
@@ -239,11 +272,11 @@ pub fn judged_tissues<'a>(
 ) -> impl Iterator<Item = RouteJudgement<'a>> {
     let section = &resolved.scenario.planning.needle_route;
     let tissues = [Tissue::Bone, Tissue::Vessel, Tissue::Organ].into_iter();
-    let entered = Entered::new(placed, goal);
+    let passage = Passage::new(resolved, placed, goal);
     tissues.filter_map(move |tissue| {
         let margin_m = margin_m(section, tissue)?;
         let wanted = |part: &RouteObstacle| part.tissue == tissue && !is_off(section, part);
-        let nearest = nearest_of(&resolved.cell, placed, goal, &entered, wanted)?;
+        let nearest = passage.nearest(wanted)?;
         Some(RouteJudgement {
             distance_m: nearest.separation.distance_m - ROUNDING_M,
             nearest,
@@ -262,12 +295,17 @@ pub fn route_rejection(resolved: &ResolvedScenario, goal: &Goal) -> Option<Rejec
     } else {
         "is too close to"
     };
+    let bent = if judged.nearest.is_bent {
+        ", bent by tissue,"
+    } else {
+        ""
+    };
     Some(Rejection {
         rule: Rule::NeedleRoute,
         value: judged.distance_m,
         limit: judged.margin_m,
         unit: "m",
-        detail: format!("the planned needle {does} {name} ({tissue})"),
+        detail: format!("the planned needle{bent} {does} {name} ({tissue})"),
         class: Some(ClearanceClass::NeedleRoute),
     })
 }

@@ -1,12 +1,13 @@
 //! The bend of a needle in tissue: one draw of it, and its distribution.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
-use needlebench_insertion::{Factor, MODEL, Point};
+use needlebench_insertion::{Factor, MODEL};
 use needlebench_numerics::random::SplitMix64;
 use needlebench_scenario::Goal;
-use needlebench_scenario::imperfections::{NeedleDraw, TissueNeedle};
+use needlebench_scenario::imperfections::{NeedleDraw, TissueError, TissueNeedle};
 
 use crate::distribution::{Variable, hypercube};
 
@@ -57,13 +58,12 @@ impl DrawnNeedle {
 
     /// How far it is off a goal's axis at skin and tip, m, towards where its bevel pushes it.
     pub(crate) fn sizes_m(&self, goal: &Goal) -> [f64; 2] {
-        let path = goal.needle_path.as_ref();
-        let path =
-            path.expect("goals of a scenario whose needle is in tissue are resolved with its way");
-        let stand_off_m = goal.standoff_m.unwrap_or(0.0);
-        let bends_m = self.needle.bends_m(&self.draw, path, stand_off_m);
-        let [at_skin, at_tip] = bends_m.expect("tried with the medians when the goal was resolved");
-        [at_skin, at_tip * self.model]
+        // A goal that is refused for the bone in its way has no needle; what can be inserted was tried with the medians.
+        let bends_m = goal.needle_path.as_ref().and_then(|path| {
+            let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+            self.needle.bends_m(&self.draw, path, stand_off_m).ok()
+        });
+        bends_m.map_or([0.0; 2], |[at_skin, at_tip]| [at_skin, at_tip * self.model])
     }
 
     /// The same across the guide's exit at roll 0, m.
@@ -80,14 +80,9 @@ impl DrawnNeedle {
 }
 
 /// Where a goal's needle is pushed, if that is known.
-pub(crate) fn direction(needle: &TissueNeedle, goal: &Goal) -> Option<Vector2<f64>> {
-    let known = goal
-        .needle_path
-        .as_ref()
-        .and_then(|path| path.pushed_towards);
-    known
-        .filter(|_| needle.tip == Point::Bevel)
-        .map(Vector2::from)
+fn direction(needle: &TissueNeedle, goal: &Goal) -> Option<Vector2<f64>> {
+    let towards = needle.pushed_towards(goal.needle_path.as_ref()?)?;
+    Some(Vector2::from(towards))
 }
 
 /// A quarter further.
@@ -108,11 +103,22 @@ pub fn drawn_bends_m(needle: &TissueNeedle, goal: &Goal, draws: usize) -> Vec<[f
     rows.into_iter().map(sizes_m).collect()
 }
 
+/// Why it is not known how a needle bends.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoBend {
+    /// What it passes.
+    #[error("it is not known what tissue the needle passes: there is bone in its way")]
+    Unknown,
+    /// The needle, its guide or the layers.
+    #[error(transparent)]
+    Needle(#[from] TissueError),
+}
+
 /// Bends of many needles in many patients at one goal.
 #[derive(Debug, Clone)]
 pub(crate) struct Bends {
     /// At skin and tip, m, the least first.
-    sizes_m: [Vec<f64>; 2],
+    sizes_m: Arc<[Vec<f64>; 2]>,
     /// The mean direction and, a quarter further, the one across it, guide's exit at roll 0; and the standard deviation of
     /// the angle, rad, or none where any angle is as likely.
     axes: [Vector2<f64>; 2],
@@ -121,26 +127,35 @@ pub(crate) struct Bends {
 
 impl Bends {
     /// Of a needle at a goal: the same draws for every one.
-    pub fn new(needle: &TissueNeedle, goal: &Goal) -> Self {
-        let drawn_m = drawn_bends_m(needle, goal, DRAWS);
-        let sizes_m = [0, 1].map(|index| {
-            let mut all_m: Vec<f64> = drawn_m.iter().map(|both_m| both_m[index]).collect();
-            all_m.sort_by(f64::total_cmp);
-            all_m
+    ///
+    /// # Errors
+    /// [`NoBend`].
+    pub fn new(needle: &TissueNeedle, goal: &Goal) -> Result<Self, NoBend> {
+        let path = goal.needle_path.as_ref().ok_or(NoBend::Unknown)?;
+        let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+        needle.bends_m(&needle.medians(), path, stand_off_m)?;
+        let sizes_m = path.bends_m(needle, stand_off_m, || {
+            let drawn_m = drawn_bends_m(needle, goal, DRAWS);
+            [0, 1].map(|index| {
+                let mut all_m: Vec<f64> = drawn_m.iter().map(|both_m| both_m[index]).collect();
+                all_m.sort_by(f64::total_cmp);
+                all_m
+            })
         });
         let towards = direction(needle, goal);
         let from = towards.unwrap_or_else(Vector2::x);
-        Self {
+        Ok(Self {
             sizes_m,
             axes: [from, across(&from)],
             spread_rad: towards.map(|_| needle.bevel_spread_rad),
-        }
+        })
     }
 
     /// At skin (0) or tip (1), along the axes of the guide's exit turned by `turn`.
     pub fn at(&self, index: usize, turn: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Bend {
         Bend {
-            sizes_m: self.sizes_m[index].clone(),
+            sizes_m: Arc::clone(&self.sizes_m),
+            index,
             axes: self
                 .axes
                 .map(|axis| turn(Vector3::new(axis.x, axis.y, 0.0))),
@@ -152,7 +167,10 @@ impl Bends {
 /// Bends at one place.
 #[derive(Debug, Clone)]
 pub(crate) struct Bend {
-    sizes_m: Vec<f64>,
+    /// At skin and tip.
+    sizes_m: Arc<[Vec<f64>; 2]>,
+    /// Of which this is.
+    index: usize,
     axes: [Vector3<f64>; 2],
     spread_rad: Option<f64>,
 }
@@ -168,9 +186,10 @@ impl Bend {
 
     /// Mean and covariance, m, m^2.
     pub fn moments(&self) -> (Vector3<f64>, Matrix3<f64>) {
-        let count = self.sizes_m.len() as f64;
-        let mean_m = self.sizes_m.iter().sum::<f64>() / count;
-        let square_m2 = self.sizes_m.iter().map(|size| size * size).sum::<f64>() / count;
+        let sizes_m = &self.sizes_m[self.index];
+        let count = sizes_m.len() as f64;
+        let mean_m = sizes_m.iter().sum::<f64>() / count;
+        let square_m2 = sizes_m.iter().map(|size| size * size).sum::<f64>() / count;
         let squares = self.axes.map(|axis| axis * axis.transpose());
         match self.spread_rad {
             None => (
@@ -191,8 +210,9 @@ impl Bend {
 
     /// The bend at two shares of all, each in (0, 1): of its size, and of its direction.
     pub fn quantile(&self, [size, angle]: [f64; 2]) -> Vector3<f64> {
-        let at = size * self.sizes_m.len() as f64 - 0.5;
-        let last = self.sizes_m.len() - 1;
+        let sizes_m = &self.sizes_m[self.index];
+        let at = size * sizes_m.len() as f64 - 0.5;
+        let last = sizes_m.len() - 1;
         let below = at.clamp(0.0, last as f64);
         #[expect(
             clippy::cast_possible_truncation,
@@ -202,7 +222,7 @@ impl Bend {
         let index = (below as usize).min(last.saturating_sub(1));
         let next = (index + 1).min(last);
         let share = below - index as f64;
-        let size_m = self.sizes_m[index] * (1.0 - share) + self.sizes_m[next] * share;
+        let size_m = sizes_m[index] * (1.0 - share) + sizes_m[next] * share;
         let angle_rad = match self.spread_rad {
             None => PI * (2.0 * angle - 1.0),
             Some(spread_rad) => spread_rad * needlebench_numerics::normal::quantile(angle),

@@ -16,7 +16,7 @@ use needlebench_scenario::imperfections::{Breathing, Imperfections, SkinMarkers}
 use needlebench_scenario::{Goal, ResolvedScenario};
 use serde::Serialize;
 
-use crate::bend::Bends;
+use crate::bend::{Bends, NoBend};
 use crate::truth::only;
 use crate::{RestingFriction, SettleError, Source, Stage, resting_friction};
 
@@ -94,9 +94,11 @@ impl BudgetCase<'_> {
     }
 
     /// How the needle bends, if it does so in tissue: the same for all sources and configurations.
-    fn bends(&self) -> Option<Bends> {
-        let needle = self.imperfections.tissue()?;
-        Some(Bends::new(needle, self.goal))
+    fn bends(&self) -> Result<Option<Bends>, NoBend> {
+        let needle = self.imperfections.tissue();
+        needle
+            .map(|needle| Bends::new(needle, self.goal))
+            .transpose()
     }
 
     fn friction(&self, imperfections: &Imperfections) -> Option<RestingFriction> {
@@ -115,6 +117,9 @@ pub enum BudgetError {
     /// The arm does not come to rest.
     #[error(transparent)]
     Settle(#[from] SettleError),
+    /// The needle.
+    #[error(transparent)]
+    Bend(#[from] NoBend),
 }
 
 /// Bias and covariance of a point of the needle, real minus where it should be.
@@ -290,7 +295,7 @@ pub fn budget(
     samples: Samples,
     seed: u64,
 ) -> Result<ErrorBudget, BudgetError> {
-    let bends = case.bends();
+    let bends = case.bends()?;
     let bends = bends.as_ref();
     let sources = Source::ALL
         .into_iter()
@@ -327,7 +332,7 @@ pub fn total_budget(
     samples: usize,
     seed: u64,
 ) -> Result<ErrorBudget, BudgetError> {
-    totals(case, case.bends().as_ref(), samples, seed)
+    totals(case, case.bends()?.as_ref(), samples, seed)
 }
 
 fn totals(
@@ -435,7 +440,7 @@ fn breathing_freely(imperfections: &Imperfections) -> Option<Imperfections> {
 /// # Errors
 /// [`BudgetError`].
 pub fn analytic_total(case: &BudgetCase<'_>) -> Result<[Moments; 2], BudgetError> {
-    analytic::moments(case, case.imperfections, case.bends().as_ref())
+    analytic::moments(case, case.imperfections, case.bends()?.as_ref())
 }
 
 /// A variance below this is none, m^2: a nanometre squared.

@@ -522,10 +522,18 @@ impl Truth {
     ///
     /// What bends the needle off its line counts as a motion of skin and target the other way.
     pub fn wanted(&self, goal: &Goal, planned: &[Point3<f64>; 2]) -> [Point3<f64>; 2] {
+        self.wanted_beside(goal, planned, &self.bent_m(goal))
+    }
+
+    fn wanted_beside(
+        &self,
+        goal: &Goal,
+        planned: &[Point3<f64>; 2],
+        bent_m: &[Vector3<f64>; 2],
+    ) -> [Point3<f64>; 2] {
         let unseen_m = [Vector3::zeros(), self.unseen_m];
-        let bent_m = self.bent_m(goal);
         std::array::from_fn(|at| {
-            self.at_insertion(goal, at, self.shift * planned[at], unseen_m[at], &bent_m)
+            self.at_insertion(goal, at, self.shift * planned[at], unseen_m[at], bent_m)
         })
     }
 
@@ -564,9 +572,10 @@ impl Truth {
     /// A true target is where it is, whatever registration and image say of it: breathing and tissue alone move it.
     pub fn goal(&self, planned: &Goal) -> Goal {
         let entry_m = planned.entry_m.unwrap_or(planned.target_m);
-        let [entry_m, target_m] = self.wanted(planned, &[entry_m, planned.target_m]);
-        let known = planned.true_target_m;
         let bent_m = self.bent_m(planned);
+        let [entry_m, target_m] =
+            self.wanted_beside(planned, &[entry_m, planned.target_m], &bent_m);
+        let known = planned.true_target_m;
         Goal {
             target_m,
             true_target_m: known

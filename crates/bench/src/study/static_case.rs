@@ -224,7 +224,7 @@ impl StaticWorker {
 /// Clearance of the planned needle on its way, m; none without a phantom.
 fn route_m(resolved: &ResolvedScenario) -> Option<f64> {
     let placed = resolved.phantom.as_ref()?;
-    let nearest = needle_route(&resolved.cell, placed, &resolved.goals[0])?;
+    let nearest = needle_route(resolved, placed, &resolved.goals[0])?;
     Some(nearest.separation.distance_m)
 }
 

@@ -78,7 +78,7 @@ fn agrees(resolved: &ResolvedScenario, row: &CaseRow, configuration: Configurati
         .fold(f64::INFINITY, f64::min);
     assert_eq!(row.get("clearance_static"), Some(least_m));
     let placed = resolved.phantom.as_ref().unwrap();
-    let route = needle_route(&resolved.cell, placed, goal);
+    let route = needle_route(resolved, placed, goal);
     assert_eq!(
         row.get("needle_route"),
         route.map(|route| route.separation.distance_m)

@@ -209,7 +209,7 @@ impl<'a> GoalPlacer<'a> {
             phantom: self.resolved.phantom.as_ref(),
             fixtures: &self.fixtures,
             boxes: &self.boxes,
-            needle: self.resolved.scenario.needle_in_tissue(),
+            needle: self.resolved.needle_in_tissue(),
         };
         resolve_goal(&toml, 0, section, &surroundings, &mut Vec::new())
     }

@@ -41,7 +41,7 @@ use needlebench_robot::{LoadedRobot, LoadedTool, RobotDescription};
 
 use crate::engine_name::check_engine_names;
 use crate::fixtures::Fixture;
-use crate::scenario::{self, GoalSection, IN_IMPERFECTIONS, Scenario};
+use crate::scenario::{self, GoalSection, IN_IMPERFECTIONS, NeedleBlock, Scenario};
 use arm_values::check_brakes;
 use assumed::assume;
 pub use assumed::name_from_file;
@@ -51,7 +51,7 @@ pub use entry::{ChooseEntry, ChosenEntry, EntryChooser, GoalPlacer, NoEntry, Ope
 use excitation::{ExcitationProtocol, check_sweeps, resolve_excitation};
 pub use expected::Expected;
 use expected::RealThings;
-use goals::check_insertion;
+use goals::check_insertions;
 use goals::{BodyBoxes, Surroundings, resolve_goal};
 pub use goals::{Expectation, Goal, Roll, direction};
 pub use gravity::GravitySettings;
@@ -126,6 +126,13 @@ pub struct ResolvedScenario {
 }
 
 impl ResolvedScenario {
+    /// The block of the needle, with its key, where it bends in tissue.
+    pub(crate) fn needle_in_tissue(&self) -> Option<(&'static str, &NeedleBlock)> {
+        let expected = self.expected.as_ref()?;
+        expected.imperfections.tissue()?;
+        self.scenario.needle_in_tissue()
+    }
+
     /// The same scenario with one of its goals alone.
     ///
     /// # Panics
@@ -506,7 +513,7 @@ pub(crate) fn resolve(
     surroundings.extend(obstacles.bodies(&scenario.obstacles));
     fixtures.extend(obstacles.fixtures());
     note_idle_criteria(&scenario, &mut notes);
-    let goals = {
+    let mut goals = {
         let fixtures: Vec<CollisionBody> = surroundings
             .iter()
             .filter(|body| body.kind != BodyKind::Phantom)
@@ -596,17 +603,25 @@ pub(crate) fn resolve(
     let imperfections =
         imperfections.map(|section| real.resolve(section, IN_IMPERFECTIONS, &mut notes));
     let mut imperfections = imperfections.transpose().map_err(one)?;
-    let expected = real
+    let mut expected = real
         .expected(&scenario, imperfections.as_ref(), &mut notes)
         .map_err(one)?;
-    if let Some((place, _)) = scenario.needle_in_tissue() {
-        let all = imperfections
-            .as_ref()
-            .or(expected.as_ref().map(|each| &each.imperfections));
-        let needle = all.and_then(Imperfections::tissue);
-        for goal in &goals {
-            check_insertion(toml, place, needle, goal, &mut notes).map_err(one)?;
-        }
+    {
+        let predicted = expected.as_mut().map(|each| &mut each.imperfections);
+        let mut found: Vec<_> = imperfections
+            .as_mut()
+            .into_iter()
+            .chain(predicted)
+            .collect();
+        check_insertions(
+            toml,
+            &scenario,
+            phantom.as_ref(),
+            &mut goals,
+            &mut found,
+            &mut notes,
+        )
+        .map_err(one)?;
     }
     check_brakes(toml, &scenario, &robot, &mut notes).map_err(one)?;
     let file = &source.file;

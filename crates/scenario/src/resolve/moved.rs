@@ -87,7 +87,7 @@ impl StillLayout {
             phantom: resolved.phantom.as_ref(),
             fixtures: &others,
             boxes: &boxes,
-            needle: scenario.needle_in_tissue(),
+            needle: resolved.needle_in_tissue(),
         };
         let goal = goal_in_phantom(&toml, 0, goal_section, &context, &mut notes).map_err(one)?;
         Ok(Some(Self {
@@ -142,7 +142,7 @@ impl StillLayout {
             phantom: Some(&placed),
             fixtures: &self.fixtures,
             boxes: &self.boxes,
-            needle: scenario.needle_in_tissue(),
+            needle: self.resolved.needle_in_tissue(),
         };
         let goal =
             place_goal(&toml, 0, &scenario.goals[0], self.goal.as_ref(), &context).map_err(one)?;

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::models::names_or_path;
 
 pub use measured::CovarianceMm2;
-pub(crate) use needle::{BevelFace, IN_EXPECTED, IN_IMPERFECTIONS};
+pub(crate) use needle::{BevelFace, IN_EXPECTED, IN_IMPERFECTIONS, SIDE_FORCE_N};
 pub use needle::{ForcesBlock, MeasuredForce, NeedleBlock, NeedleModel, NeedleTip, StiffnessBlock};
 
 pub(crate) use measured::covariance_m2;

@@ -60,7 +60,7 @@ pub use imperfections::{
     TorqueLimitsBlock,
 };
 pub(crate) use imperfections::{
-    BevelFace, IN_EXPECTED, IN_IMPERFECTIONS, POPULATION, covariance_m2,
+    BevelFace, IN_EXPECTED, IN_IMPERFECTIONS, POPULATION, SIDE_FORCE_N, covariance_m2,
 };
 pub(crate) use iso9283::STANDARD_EDGES_MM;
 pub use iso9283::{Horizontal, Iso9283Criteria, Iso9283Section};
@@ -187,20 +187,16 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// The block of a needle that bends in tissue, with its key; none where it bends in air or not at all.
+    /// The block of a needle that bends in tissue, with its key; none where it bends in air or not at all. It is the usual one
+    /// where the scenario says nothing of its needle.
     pub(crate) fn needle_in_tissue(&self) -> Option<(&'static str, &NeedleBlock)> {
-        let own = self
-            .imperfections
-            .as_ref()
-            .and_then(|section| section.needle.as_ref());
-        let places = [
-            (IN_IMPERFECTIONS, own),
-            (IN_EXPECTED, self.expected.needle.as_ref()),
-        ];
-        let given = places
-            .into_iter()
-            .find_map(|(place, block)| Some((place, block?)));
-        given.filter(|(_, block)| block.model == NeedleModel::Tissue)
+        static USUAL: LazyLock<NeedleBlock> = LazyLock::new(NeedleBlock::default);
+        let (place, block) = match &self.imperfections {
+            Some(section) => (IN_IMPERFECTIONS, section.needle.as_ref()?),
+            None => (IN_EXPECTED, self.expected.needle.as_ref().unwrap_or(&USUAL)),
+        };
+        let is_in_patient = self.phantom.is_some() || block.asks_for_tissue();
+        (is_in_patient && block.model() == NeedleModel::Tissue).then_some((place, block))
     }
 
     /// The section that defines what a class is measured against, and whether the scenario has it, or an obstacle that

@@ -48,30 +48,80 @@ fn a_needle_in_tissue_passes_what_is_between_skin_and_tip() {
         let needle = resolved.expected.unwrap().imperfections;
         assert!(needle.tissue().is_some());
     }
-    let in_air = resolve(GOAL, "[imperfections.needle]\n").unwrap();
-    assert_eq!(in_air.goals[0].needle_path, None);
+    for usual in ["", "[expected.needle]\n", "[imperfections.needle]\n"] {
+        let resolved = resolve(GOAL, usual).unwrap();
+        assert!(resolved.goals[0].needle_path.is_some(), "{usual}");
+        assert!(
+            resolved.expected.unwrap().imperfections.tissue().is_some(),
+            "{usual}"
+        );
+    }
+    for air in ["model = \"cantilever\"\n", "side_force_n = 0.1\n"] {
+        let resolved = resolve(GOAL, &format!("[expected.needle]\n{air}")).unwrap();
+        assert_eq!(resolved.goals[0].needle_path, None);
+        assert!(
+            resolved.expected.unwrap().imperfections.tissue().is_none(),
+            "{air}"
+        );
+    }
+}
+
+/// A scenario that says nothing of its needle runs whatever is in the needle's way: it bends as in air where nothing else is
+/// known, and says so.
+#[test]
+fn a_needle_that_nobody_described_bends_as_in_air_where_tissue_is_not_known() {
+    // From the back through the spine or a rib: refused for that, so that no bend is missed.
+    let through = "lesion = \"pleural_based\"\nentry_direction_deg = [100, 0]";
+    let refused = resolve(through, "").unwrap();
+    assert_eq!(refused.goals[0].needle_path, None);
+    let is_in_tissue = |resolved: &ResolvedScenario| {
+        let expected = resolved.expected.as_ref().unwrap();
+        expected.imperfections.tissue().is_some()
+    };
+    let says = |resolved: &ResolvedScenario| {
+        let mut notes = resolved.notes.iter();
+        notes.any(|note| note.contains("needles bend as in air"))
+    };
+    assert!(!says(&refused));
+    let allowed = resolve(through, "[planning.needle_route]\noff = [\"bone\"]\n").unwrap();
+    assert!(!is_in_tissue(&allowed) && says(&allowed));
+    // A play of 3 mm is none that the model has.
+    let loose = "[imperfections.needle]\n[imperfections.guide]\ndiametral_clearance_mm = 3\n";
+    let loose = resolve(GOAL, loose).unwrap();
+    assert!(!is_in_tissue(&loose) && says(&loose));
+    assert_eq!(loose.goals[0].needle_path, None);
+    let text = "name = \"x\"\n[robot]\n[[goals]]\nname = \"g\"\nflange_pose = { position_mm = [-300, -100, 300], \
+                rotation_vector_rad = [0, 3, 0] }\ninsertion_length_mm = 100\n";
+    let free =
+        resolve_scenario("x.toml", text, Path::new(""), &Overrides::default()).expect("no patient");
+    assert!(!is_in_tissue(&free) && !says(&free));
 }
 
 #[test]
 fn what_no_needle_does_is_refused_with_its_key() {
     for (more, key, says) in [
         (
-            "bevel = \"3:00\"\n",
+            "model = \"cantilever\"\nbevel = \"3:00\"\n",
             "bevel",
             "no meaning in model `cantilever`",
         ),
         (
-            "turn_at_mm = 20\n",
+            "model = \"cantilever\"\nturn_at_mm = 20\n",
             "turn_at_mm",
             "no meaning in model `cantilever`",
         ),
         (
-            "forces.living = 0.5\n",
+            "model = \"cantilever\"\nforces.living = 0.5\n",
             "forces",
             "no meaning in model `cantilever`",
         ),
         (
-            "model = \"tissue\"\nside_force_n = 0.2\n",
+            "side_force_n = 0.1\nbevel = \"3:00\"\n",
+            "bevel",
+            "no meaning in model `cantilever`",
+        ),
+        (
+            "model = \"tissue\"\nside_force_n = 0.1\n",
             "side_force_n",
             "no meaning in model `tissue`",
         ),

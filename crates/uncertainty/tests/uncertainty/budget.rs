@@ -161,7 +161,7 @@ fn sag_that_a_calibration_has_taken_for_geometry_is_not_counted_twice() {
 /// `F L^3 / (3 E I)` of a steel rod of 1.27 mm over 86 mm, by hand: 0.830 mm at 0.1 N.
 #[test]
 fn needle_bends_as_a_cantilever_does() {
-    let budget = &budgets("[imperfections.needle]\n", 0)[0];
+    let budget = &budgets("[imperfections.needle]\nmodel = \"cantilever\"\n", 0)[0];
     let at_target = budget.total.at_target.analytic;
     assert!(
         (at_target.rms_m - 0.8302e-3).abs() < 1e-6,

@@ -135,7 +135,7 @@ fn route_surplus_m(resolved: &ResolvedScenario, moved: &MovedPhantom) -> f64 {
     let criteria = &resolved.scenario.criteria.min_clearance_mm;
     let least_mm = criteria.least_mm(ClearanceClass::NeedleRoute);
     let by_criterion_m = least_mm.and_then(|least_mm| {
-        let nearest = needle_route(&resolved.cell, phantom, goal)?;
+        let nearest = needle_route(resolved, phantom, goal)?;
         Some(nearest.separation.distance_m - least_mm * 1e-3)
     });
     let surpluses_m = [by_rule_m, by_criterion_m].into_iter().flatten();

@@ -569,7 +569,12 @@ pub fn route_in_words(route: &RouteReport, wanted_m: Option<f64>) -> String {
         format!("{mm:.1} mm clearance to {part} ({tissue})")
     };
     format!(
-        "needle path{}: {where_it_goes}, {:.1} mm required",
+        "needle path{}{}: {where_it_goes}, {:.1} mm required",
+        if route.is_bent {
+            ", bent by tissue"
+        } else {
+            ""
+        },
         if route.kept { "" } else { " REJECTED" },
         1e3 * wanted_m.map_or(route.margin_m, |wanted_m| wanted_m.max(route.margin_m))
     )

@@ -122,7 +122,7 @@ pub(super) fn from_flange_pose(
             placed.map_or_else(Pose::identity, |placed| placed.world_from_phantom.inverse());
         let phantom = placed.map(|placed| &*placed.phantom);
         let path = needle_path(text, place, block, phantom, &goal, &to_phantom)?;
-        goal.needle_path = Some(Arc::new(path));
+        goal.needle_path = path.map(Arc::new);
     }
     Ok(goal)
 }

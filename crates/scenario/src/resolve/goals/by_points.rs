@@ -163,7 +163,7 @@ pub(super) fn from_entry_and_target(
     };
     if let Some((place, block)) = surroundings.needle {
         let path = needle_path(text, place, block, Some(phantom), &goal, &Pose::identity())?;
-        goal.needle_path = Some(Arc::new(path));
+        goal.needle_path = path.map(Arc::new);
     }
     Ok(GoalInPhantom(goal))
 }

@@ -16,7 +16,7 @@ use needlebench_kinematics::Pose;
 use needlebench_kinematics::ik::Configuration;
 use serde::{Deserialize, Serialize};
 
-use super::imperfections::NeedlePath;
+use super::imperfections::{NeedlePath, TissueNeedle, bends_along_m};
 use super::phantom::{Corners, PlacedPhantom};
 use crate::scenario::{EVERY_CONFIGURATION, GoalSection, NeedleBlock};
 use by_flange::from_flange_pose;
@@ -25,7 +25,7 @@ pub use by_points::direction;
 use by_points::from_entry_and_target;
 pub(crate) use by_points::target_inside;
 use checks::{check_place, check_target};
-pub(crate) use needle_path::check_insertion;
+pub(crate) use needle_path::check_insertions;
 
 /// Angle of the guide about the needle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -84,6 +84,28 @@ impl Goal {
     /// Pose of the guide's exit in the world at a roll, rad.
     pub fn world_from_guide_exit_at(&self, roll_rad: f64) -> Pose {
         self.world_from_guide_exit * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll_rad)
+    }
+
+    /// Points of a needle that is bent off the axis, from the skin to its tip, world: `path_m` has depths and bends, `towards`
+    /// is a unit vector across the guide's exit at roll 0.
+    pub fn bent_line(&self, path_m: &[[f64; 2]], towards: [f64; 2]) -> Vec<Point3<f64>> {
+        let entry = self.entry_m.unwrap_or(self.target_m);
+        let [x, y] = towards;
+        let across = self.world_from_guide_exit.rotation * Vector3::new(x, y, 0.0);
+        let at = |[depth_m, bend_m]: &[f64; 2]| {
+            entry + self.axis.into_inner() * *depth_m + across * *bend_m
+        };
+        path_m.iter().map(at).collect()
+    }
+
+    /// The line of the median needle that tissue bends, from the skin to its tip, world; none where it is not known to which
+    /// side.
+    pub fn median_line(&self, needle: &TissueNeedle) -> Option<Vec<Point3<f64>>> {
+        let path = self.needle_path.as_ref()?;
+        let towards = needle.pushed_towards(path)?;
+        let stand_off_m = self.standoff_m.unwrap_or(0.0);
+        let inserted = needle.insert(&needle.medians(), path, stand_off_m).ok()?;
+        Some(self.bent_line(&bends_along_m(&inserted), towards))
     }
 
     /// Length of the planned needle in the patient, m; `None` without a phantom.

@@ -8,13 +8,18 @@ use needlebench_phantom::{Phantom, Tissue};
 use needlebench_insertion::WARNED_SLOPE;
 
 use super::Goal;
-use crate::resolve::imperfections::{NeedlePath, TissueNeedle};
-use crate::scenario::{BevelFace, NeedleBlock};
+use crate::resolve::imperfections::{Imperfections, KnownBends, NeedlePath, TissueNeedle};
+use crate::resolve::phantom::PlacedPhantom;
+use crate::scenario::{BevelFace, NeedleBlock, Scenario};
+
+/// All bones, where what a needle may pass through is named.
+const BONE: &str = "bone";
 
 /// Least sine of the angle between a needle and a direction that its bevel is to face.
 const LEAST_SINE: f64 = 0.3;
 
-/// The way of a goal's needle through a phantom; the goal is in the frame that `to_phantom` is from.
+/// The way of a goal's needle through a phantom; the goal is in the frame that `to_phantom` is from. None where it is not
+/// known and nothing in the block asks for it.
 pub(super) fn needle_path(
     text: &TomlText<'_>,
     place: &str,
@@ -22,8 +27,12 @@ pub(super) fn needle_path(
     phantom: Option<&Phantom>,
     goal: &Goal,
     to_phantom: &Pose,
-) -> Result<NeedlePath, Finding> {
+) -> Result<Option<NeedlePath>, Finding> {
+    let is_asked_for = block.asks_for_tissue();
     let (Some(entry), Some(phantom)) = (goal.entry_m, phantom) else {
+        if !is_asked_for {
+            return Ok(None);
+        }
         let message = format!(
             "goal `{}` has no patient whose tissue bends its needle",
             goal.name
@@ -33,14 +42,18 @@ pub(super) fn needle_path(
             finding.hint("add a [phantom], or `model = \"cantilever\"` for a needle in air")
         );
     };
-    let exit = goal.world_from_guide_exit.translation.vector;
-    let tip = Point3::from(exit + goal.axis.into_inner() * goal.insertion_length_m);
-    let [entry, tip] = [entry, tip].map(|at| to_phantom * at);
-    let layers = phantom.layers(&entry, &tip).map_err(|error| {
-        let message = format!("goal `{}`: {error}", goal.name);
-        let finding = text.finding(&format!("{place}.model"), message);
-        finding.hint("choose an entry that passes the bone: `needlebench suggest` proposes some")
-    })?;
+    let [entry, tip] = [entry, tip_of(goal)].map(|at| to_phantom * at);
+    let layers = match phantom.layers(&entry, &tip) {
+        Ok(layers) => layers,
+        Err(_) if !is_asked_for => return Ok(None),
+        Err(error) => {
+            let message = format!("goal `{}`: {error}", goal.name);
+            let finding = text.finding(&format!("{place}.model"), message);
+            return Err(finding.hint(
+                "choose an entry that passes the bone: `needlebench suggest` proposes some",
+            ));
+        }
+    };
     let depth_m = (tip - entry).norm();
     if let Some(turn_at_mm) = block.turn_at_mm.filter(|mm| mm * 1e-3 > depth_m) {
         let message = format!(
@@ -107,37 +120,100 @@ pub(super) fn needle_path(
             Ok(in_guide(-off.normalize()))
         })
         .transpose()?;
-    Ok(NeedlePath {
+    Ok(Some(NeedlePath {
         layers,
         pushed_towards,
         clock: [twelve, three].map(in_guide),
-    })
+        known: KnownBends::default(),
+    }))
 }
 
-/// Checks that a needle can be inserted on its way, and notes where it bends more than the model is for.
-pub(crate) fn check_insertion(
+/// Where a goal's needle ends, in the goal's frame.
+fn tip_of(goal: &Goal) -> Point3<f64> {
+    let exit = goal.world_from_guide_exit.translation.vector;
+    Point3::from(exit + goal.axis.into_inner() * goal.insertion_length_m)
+}
+
+/// Checks that the needles of all goals can be inserted as their scenario has them, and notes where one bends more than the
+/// model is for. A scenario that does not ask for a needle in tissue bends all as in air where one cannot be inserted.
+pub(crate) fn check_insertions(
     text: &TomlText<'_>,
-    place: &str,
-    needle: Option<&TissueNeedle>,
-    goal: &Goal,
+    scenario: &Scenario,
+    phantom: Option<&PlacedPhantom>,
+    goals: &mut [Goal],
+    found: &mut [&mut Imperfections],
     notes: &mut Vec<String>,
 ) -> Result<(), Finding> {
-    let Some((needle, path)) = needle.zip(goal.needle_path.as_ref()) else {
-        return Ok(());
+    if let Some((place, block)) = scenario.needle_in_tissue() {
+        let Some(needle) = found.iter().find_map(|each| each.tissue()) else {
+            return Ok(());
+        };
+        let off = &scenario.planning.needle_route.off;
+        let each = goals
+            .iter()
+            .map(|goal| inserted(needle, goal, phantom, off));
+        match each.collect::<Result<Vec<_>, String>>() {
+            Ok(rough) => {
+                notes.extend(rough.into_iter().flatten());
+                return Ok(());
+            }
+            Err(message) if block.asks_for_tissue() => {
+                let finding = text.finding(&format!("{place}.model"), message);
+                return Err(finding.hint("`model = \"cantilever\"` for a needle in air"));
+            }
+            Err(message) => notes.push(format!(
+                "{message}; needles bend as in air (`{place}.model`)"
+            )),
+        }
+    }
+    for each in found {
+        each.bend_in_air();
+    }
+    for goal in goals {
+        goal.needle_path = None;
+    }
+    Ok(())
+}
+
+/// Inserts the median needle of a goal: what is to be noted, or why it cannot be inserted. A goal whose way is not known has
+/// no needle to insert where it is refused for the bone in it.
+fn inserted(
+    needle: &TissueNeedle,
+    goal: &Goal,
+    phantom: Option<&PlacedPhantom>,
+    off: &[String],
+) -> Result<Option<String>, String> {
+    let Some(path) = &goal.needle_path else {
+        let ways = phantom.zip(goal.entry_m).map(|(placed, entry)| {
+            let to_phantom = placed.world_from_phantom.inverse();
+            (placed, [entry, tip_of(goal)].map(|at| to_phantom * at))
+        });
+        let is_refused = ways.is_some_and(|(placed, [entry, tip])| {
+            let mut bones = placed.phantom.bones_met(&entry, &tip);
+            bones.any(|bone| {
+                let called = [Some(&bone.name), bone.organ.as_ref()];
+                let is_called = |name: &String| called.contains(&Some(name)) || name == BONE;
+                !off.iter().any(is_called)
+            })
+        });
+        return if is_refused {
+            Ok(None)
+        } else {
+            Err(format!(
+                "goal `{}`: it is not known what tissue its needle passes",
+                goal.name
+            ))
+        };
     };
     let stand_off_m = goal.standoff_m.unwrap_or(0.0);
     let inserted = needle.insert(&needle.medians(), path, stand_off_m);
-    let inserted = inserted.map_err(|error| {
-        let message = format!("goal `{}`: {error}", goal.name);
-        text.finding(&format!("{place}.model"), message)
-    })?;
+    let inserted = inserted.map_err(|error| format!("goal `{}`: {error}", goal.name))?;
     let slope = inserted.largest_slope();
-    if slope > WARNED_SLOPE {
-        notes.push(format!(
+    Ok((slope > WARNED_SLOPE).then(|| {
+        format!(
             "goal `{}`: the needle bends to a slope of {slope:.2}, and its model is for slopes below {WARNED_SLOPE}: \
              the bend is a rough figure",
             goal.name
-        ));
-    }
-    Ok(())
+        )
+    }))
 }

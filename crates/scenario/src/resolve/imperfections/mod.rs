@@ -12,7 +12,11 @@ pub use absorbed::AbsorbedSag;
 pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
 pub use localised::{Localisation, Markers, TargetLocalisation};
-pub use needle::{Cantilever, NeedleBending, NeedleDraw, NeedlePath, TissueError, TissueNeedle};
+pub(crate) use needle::KnownBends;
+pub use needle::{
+    Cantilever, NeedleBending, NeedleDraw, NeedlePath, TissueError, TissueNeedle, bend_at_m,
+    bends_along_m,
+};
 pub use needlebench_cell::GearTwist;
 
 pub use super::arm_values::JointFriction;
@@ -71,6 +75,13 @@ impl Imperfections {
         match &self.needle {
             Some(NeedleBending::Tissue(needle)) => Some(needle),
             _ => None,
+        }
+    }
+
+    /// A needle in tissue bends as it would in air instead.
+    pub(crate) fn bend_in_air(&mut self) {
+        if let Some(NeedleBending::Tissue(needle)) = &self.needle {
+            self.needle = Some(NeedleBending::Cantilever(needle.in_air()));
         }
     }
 

@@ -1,6 +1,7 @@
 //! The needle as a beam, in air or in tissue.
 
 use std::path::Path;
+use std::sync::{Arc, OnceLock};
 
 use needlebench_cell::Tool;
 use needlebench_input::{Finding, Location, ModelSource, TomlText, from_toml, source_of};
@@ -11,7 +12,7 @@ use needlebench_insertion::{
 use needlebench_phantom::PassedLayer;
 use serde::Deserialize;
 
-use crate::scenario::{NeedleBlock, NeedleModel, NeedleTip};
+use crate::scenario::{NeedleBlock, NeedleModel, NeedleTip, SIDE_FORCE_N};
 
 /// Bending of the needle.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,6 +51,37 @@ pub struct NeedlePath {
     /// Twelve and three on the clock at the hub, of the same: towards the patient's head as near as the needle lets, and a
     /// quarter further as seen along the insertion.
     pub clock: [[f64; 2]; 2],
+    /// What was drawn of it.
+    pub(crate) known: KnownBends,
+}
+
+/// Bends that were drawn of one needle at one stand-off: they are the same in all configurations, wherever the patient lies.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct KnownBends(OnceLock<(TissueNeedle, f64, Arc<[Vec<f64>; 2]>)>);
+
+/// They say nothing that the path does not say, and so all are equal.
+impl PartialEq for KnownBends {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl NeedlePath {
+    /// Bends at skin and tip as `draw` has them, m: drawn once for the needle and the stand-off that are asked for first.
+    pub fn bends_m(
+        &self,
+        needle: &TissueNeedle,
+        stand_off_m: f64,
+        draw: impl Fn() -> [Vec<f64>; 2],
+    ) -> Arc<[Vec<f64>; 2]> {
+        let of_this = || (needle.clone(), stand_off_m, Arc::new(draw()));
+        let (known, at_m, bends_m) = self.known.0.get_or_init(of_this);
+        if known == needle && *at_m == stand_off_m {
+            bends_m.clone()
+        } else {
+            Arc::new(draw())
+        }
+    }
 }
 
 /// A needle that cuts its path through tissue, and what is known of its forces.
@@ -83,6 +115,14 @@ impl TissueNeedle {
     /// The tissues that have coefficients of their own.
     pub const KINDS: [Tissue; 4] = [Tissue::Fat, Tissue::Wall, Tissue::Lung, Tissue::Lesion];
 
+    /// The same needle in air.
+    pub(super) fn in_air(&self) -> Cantilever {
+        Cantilever {
+            side_force_n: SIDE_FORCE_N,
+            rigidity_nm2: self.needle.bending_stiffness_nm2(),
+        }
+    }
+
     /// The median of all that is uncertain.
     pub fn medians(&self) -> NeedleDraw {
         NeedleDraw {
@@ -93,14 +133,11 @@ impl TissueNeedle {
         }
     }
 
-    /// What of an insertion the solver is asked for: along one axis lateral to the needle, towards which the tip is pushed.
-    fn inserted<T>(
-        &self,
-        draw: &NeedleDraw,
-        path: &NeedlePath,
-        stand_off_m: f64,
-        solve: impl Fn(&Needle, &Holder, f64, &Layers, &Bevel) -> Result<T, InsertionError>,
-    ) -> Result<T, TissueError> {
+    /// Layers with what they do to a needle.
+    ///
+    /// # Errors
+    /// [`LayersError`] for what is no layer.
+    pub fn layers(&self, draw: &NeedleDraw, path: &NeedlePath) -> Result<Layers, LayersError> {
         let force_n = draw.wall_force_n * self.living * self.tip.share();
         let layers = path.layers.iter().map(|layer| {
             let index = Self::KINDS.iter().position(|kind| *kind == layer.tissue);
@@ -115,7 +152,18 @@ impl TissueNeedle {
             layer.force_n = layer.force_n.min(STRONGEST_N);
             layer
         });
-        let layers = Layers::new(layers.collect())?;
+        Layers::new(layers.collect())
+    }
+
+    /// What of an insertion the solver is asked for: along one axis lateral to the needle, towards which the tip is pushed.
+    fn inserted<T>(
+        &self,
+        draw: &NeedleDraw,
+        path: &NeedlePath,
+        stand_off_m: f64,
+        solve: impl Fn(&Needle, &Holder, f64, &Layers, &Bevel) -> Result<T, InsertionError>,
+    ) -> Result<T, TissueError> {
+        let layers = self.layers(draw, path)?;
         let bevel = Bevel {
             towards: [1.0, 0.0],
             angle_rad: self.bevel_rad,
@@ -123,6 +171,11 @@ impl TissueNeedle {
         };
         let holder = Holder::Guide(self.guide);
         Ok(solve(&draw.needle, &holder, stand_off_m, &layers, &bevel)?)
+    }
+
+    /// Where a needle is pushed on its way, if that is known: see [`NeedlePath::pushed_towards`].
+    pub fn pushed_towards(&self, path: &NeedlePath) -> Option<[f64; 2]> {
+        path.pushed_towards.filter(|_| self.tip == Point::Bevel)
     }
 
     /// The needle at the end of its way, along one axis across it: y of the solver's frame is towards where the tip is pushed.
@@ -151,6 +204,34 @@ impl TissueNeedle {
         let ends = self.inserted(draw, path, stand_off_m, needlebench_insertion::ends)?;
         Ok(ends.map(|[towards, _]| towards))
     }
+}
+
+/// Points of a bent needle, m apart.
+const STEP_M: f64 = 5e-3;
+
+/// How far what an inserted needle has cut is off the axis at a depth, m.
+pub fn bend_at_m(inserted: &Insertion, depth_m: f64) -> f64 {
+    let depths_m = &inserted.depths_m;
+    let next = depths_m
+        .partition_point(|&each| each < depth_m)
+        .clamp(1, depths_m.len() - 1);
+    let [from_m, to_m] = [depths_m[next - 1], depths_m[next]];
+    let share = ((depth_m - from_m) / (to_m - from_m)).clamp(0.0, 1.0);
+    inserted.path_m[next - 1][0] * (1.0 - share) + inserted.path_m[next][0] * share
+}
+
+/// Depths and bends of what an inserted needle has cut, m, at steps of at most 5 mm.
+pub fn bends_along_m(inserted: &Insertion) -> Vec<[f64; 2]> {
+    let end_m = inserted.depths_m.last().copied().unwrap_or(0.0);
+    let count = (end_m / STEP_M).ceil().max(1.0);
+    let mut points = Vec::new();
+    let mut number = 0.0;
+    while number <= count {
+        let depth_m = end_m * number / count;
+        points.push([depth_m, bend_at_m(inserted, depth_m)]);
+        number += 1.0;
+    }
+    points
 }
 
 /// Stiffest tissue, N/m2, and strongest force across a tip, N, that the solver takes.
@@ -220,9 +301,9 @@ pub(super) fn needle_bending(
         has_stylet: bore_m == 0.0,
         young_pa: block.young_gpa * 1e9,
     };
-    if block.model == NeedleModel::Cantilever {
+    if block.model() == NeedleModel::Cantilever {
         return Ok(NeedleBending::Cantilever(Cantilever {
-            side_force_n: block.side_force_n,
+            side_force_n: block.side_force_n.unwrap_or(SIDE_FORCE_N),
             rigidity_nm2: needle.bending_stiffness_nm2(),
         }));
     }

@@ -10,13 +10,12 @@ pub const IN_IMPERFECTIONS: &str = "imperfections.needle";
 pub const IN_EXPECTED: &str = "expected.needle";
 
 /// How the needle bends.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NeedleModel {
     /// A cantilever in air, clamped at the guide's exit, under a lateral force at the tip (`side_force_n`):
     /// `delta = F L^3 / (3 E I)`, the concentrated bevel force with which mechanics of needle steering begin (Misra et al.,
     /// Int. J. Robotics Research 29(13), 2010). No tissue; the direction is uniform.
-    #[default]
     Cantilever,
     /// A beam in a guide with play that cuts its path through the tissues between skin and target; the bevel pushes the tip.
     Tissue,
@@ -39,14 +38,15 @@ pub enum NeedleTip {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct NeedleBlock {
-    /// `cantilever`: in air, without tissue. `tissue`: the needle cuts its path through fat, chest wall, lung and lesion; the
-    /// play in the guide is solved with it and no source of its own.
-    pub model: NeedleModel,
-    /// RMS lateral force at the tip, N; model `cantilever` only. Assumed: 1 mm deflection of an 18 G needle with stylet, 90 mm
-    /// from the guide. Radiologists report at most 5.3 mm of unwanted bending on average (de Jong et al., Medical Devices
-    /// 11, 2018, 259-265).
+    /// `tissue`: the needle cuts its path through fat, chest wall, lung and lesion; the play in the guide is solved with it
+    /// and no source of its own. `cantilever`: in air, without tissue. Default: `tissue` in a patient, with a note and as in
+    /// air where a needle cannot be inserted so; `cantilever` without a patient or with `side_force_n`.
+    pub model: Option<NeedleModel>,
+    /// RMS lateral force at the tip, N; model `cantilever` only. Default: 0.1 (assumed): 1 mm deflection of an 18 G needle
+    /// with stylet, 90 mm from the guide. Radiologists report at most 5.3 mm of unwanted bending on average (de Jong et
+    /// al., Medical Devices 11, 2018, 259-265).
     #[schemars(range(min = 0.0, max = 10.0))]
-    pub side_force_n: f64,
+    pub side_force_n: Option<f64>,
     /// Young's modulus of the needle, GPa: stainless steel.
     #[schemars(range(min = 1.0, max = 500.0))]
     pub young_gpa: f64,
@@ -131,8 +131,8 @@ pub struct MeasuredForce {
 impl Default for NeedleBlock {
     fn default() -> Self {
         Self {
-            model: NeedleModel::default(),
-            side_force_n: 0.1,
+            model: None,
+            side_force_n: None,
             young_gpa: 200.0,
             bore_mm: 0.0,
             tip: NeedleTip::default(),
@@ -174,6 +174,9 @@ impl Default for StiffnessBlock {
 fn median_kn_m2(tissue: Tissue) -> f64 {
     tissue.stiffness_n_m2().median * 1e-3
 }
+
+/// RMS lateral force at the tip of a needle in air, N. Assumed: see `side_force_n`.
+pub const SIDE_FORCE_N: f64 = 0.1;
 
 /// The bevel's direction is not known.
 const UNKNOWN: &str = "unknown";
@@ -222,47 +225,67 @@ impl NeedleBlock {
         }
     }
 
+    /// The model: the one that is named, else the one that its keys are for.
+    pub(crate) fn model(&self) -> NeedleModel {
+        let usual = match self.side_force_n {
+            Some(_) => NeedleModel::Cantilever,
+            None => NeedleModel::Tissue,
+        };
+        self.model.unwrap_or(usual)
+    }
+
+    /// Whether a needle in tissue is asked for, and not the default.
+    pub(crate) fn asks_for_tissue(&self) -> bool {
+        self.model == Some(NeedleModel::Tissue) || !self.of_tissue().is_empty()
+    }
+
+    /// Keys for a needle in tissue alone that are given.
+    fn of_tissue(&self) -> Vec<&'static str> {
+        let usual = Self::default();
+        let keys = [
+            ("tip", self.tip != usual.tip),
+            ("bevel_deg", self.bevel_deg != usual.bevel_deg),
+            ("bevel", self.bevel != usual.bevel),
+            (
+                "bevel_spread_deg",
+                self.bevel_spread_deg != usual.bevel_spread_deg,
+            ),
+            ("turn_at_mm", self.turn_at_mm.is_some()),
+            ("forces", self.forces != usual.forces),
+            ("stiffness", self.stiffness != usual.stiffness),
+            ("measured", self.measured.is_some()),
+        ];
+        let given = keys.into_iter().filter(|(_, is_given)| *is_given);
+        given.map(|(key, _)| key).collect()
+    }
+
     /// Checks for keys that the model or the tip has no use for.
     pub(super) fn check(&self, toml: &TomlText<'_>, place: &str) -> Vec<Finding> {
         let usual = Self::default();
-        let unused: Vec<&str> = match self.model {
-            NeedleModel::Cantilever => [
-                ("tip", self.tip != usual.tip),
-                ("bevel_deg", self.bevel_deg != usual.bevel_deg),
-                ("bevel", self.bevel != usual.bevel),
-                (
-                    "bevel_spread_deg",
-                    self.bevel_spread_deg != usual.bevel_spread_deg,
-                ),
-                ("turn_at_mm", self.turn_at_mm.is_some()),
-                ("forces", self.forces != usual.forces),
-                ("stiffness", self.stiffness != usual.stiffness),
-                ("measured", self.measured.is_some()),
-            ]
-            .into_iter()
-            .filter_map(|(key, is_given)| is_given.then_some(key))
-            .collect(),
-            NeedleModel::Tissue if self.side_force_n != usual.side_force_n => vec!["side_force_n"],
-            NeedleModel::Tissue => Vec::new(),
+        let (unused, own, hint) = match self.model() {
+            NeedleModel::Cantilever => (
+                self.of_tissue(),
+                "cantilever",
+                "it is for a needle in tissue: `model = \"tissue\"` without `side_force_n`",
+            ),
+            NeedleModel::Tissue => (
+                self.side_force_n
+                    .map(|_| "side_force_n")
+                    .into_iter()
+                    .collect(),
+                "tissue",
+                "its forces are those of `forces.wall_n`; `side_force_n` is for `model = \"cantilever\"`",
+            ),
         };
         let mut findings: Vec<Finding> = unused
             .into_iter()
             .map(|key| {
-                let (own, hint) = match self.model {
-                    NeedleModel::Cantilever => {
-                        ("cantilever", "it is for a needle in tissue: `model = \"tissue\"`")
-                    }
-                    NeedleModel::Tissue => (
-                        "tissue",
-                        "its forces are those of `forces.wall_n`; `side_force_n` is for `model = \"cantilever\"`",
-                    ),
-                };
                 let message = format!("`{key}` has no meaning in model `{own}`");
                 toml.finding(&format!("{place}.{key}"), message).hint(hint)
             })
             .collect();
         let has_direction = self.tip == NeedleTip::Bevel;
-        if self.model == NeedleModel::Tissue && !has_direction {
+        if self.model() == NeedleModel::Tissue && !has_direction {
             let keys = [
                 ("bevel", self.bevel != usual.bevel),
                 ("turn_at_mm", self.turn_at_mm.is_some()),
