@@ -3,13 +3,14 @@
 //! Pure functions of a case and an [`Aim`]: [`route`] is answered at once from voxels and surfaces, [`reach`] by the
 //! postures of all eight configurations. Lengths in m, angles in rad; places in `ct` (patient LPS).
 
-use nalgebra::{Point3, UnitVector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_bench::preview::GoalPreview;
 use needlebench_cell::{part_in_words, reason_in_words};
 use needlebench_input::Finding;
 use needlebench_planning::{crossed_fissures, judged_tissues};
 use needlebench_routing::body_normal;
-use needlebench_scenario::Goal;
+use needlebench_scenario::imperfections::bends_along_m;
+use needlebench_scenario::{Goal, PlacedPhantom, ResolvedScenario};
 use needlebench_scenario::scenario::{GoalSection, Target};
 use needlebench_volume::{SurfaceTissue, VoxelGrid, structure_of};
 use serde::{Deserialize, Serialize};
@@ -133,8 +134,21 @@ pub struct TissueAnswer {
     pub margin_m: f64,
     /// Whether the margin is satisfied.
     pub kept: bool,
+    /// Whether it is the median needle as tissue bends it that comes so near, and not the straight one.
+    pub is_bent: bool,
     /// How far 99 % of the part's surface are from that of the voxels at most; none where it is unknown.
     pub surface_p99_m: Option<f64>,
+}
+
+/// How tissue bends the median needle.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BendAnswer {
+    /// Depths from the skin and how far the needle is off the straight line there, m; the last one is its tip's.
+    pub path_m: Vec<[f64; 2]>,
+    /// Towards where, a unit vector of `ct`; none where that is not known.
+    pub towards: Option<[f64; 3]>,
+    /// Whether the force behind it was measured, and not assumed.
+    pub is_force_measured: bool,
 }
 
 /// What is known of a needle at once.
@@ -152,6 +166,8 @@ pub struct RouteAnswer {
     pub entry_moved_m: f64,
     /// From entry to target.
     pub length_m: f64,
+    /// How tissue bends it; none for a needle in air, or one whose way is not known.
+    pub bend: Option<BendAnswer>,
     /// From the guide's exit to the needle's tip; none where the guide cannot be put there.
     pub insertion_m: Option<f64>,
     /// Why the guide cannot be placed there; distances from tissues are not evaluated then.
@@ -352,6 +368,7 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
                 distance_m: judged.distance_m,
                 margin_m: judged.margin_m,
                 kept: judged.is_kept(),
+                is_bent: judged.nearest.is_bent,
                 surface_p99_m: surface_p99_m(case, &part.name),
             }
         })
@@ -369,6 +386,7 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
         target_index: grid.index_from_ct(&needle.target_m).coords.into(),
         entry_moved_m: needle.entry_moved_m,
         length_m,
+        bend: goal.and_then(|goal| bend(resolved, placed, goal)),
         insertion_m: goal.map(|goal| goal.insertion_length_m),
         not_placed: needle.goal.as_ref().err().cloned(),
         needle_m: resolved.cell.tool.needle.length_m,
@@ -383,6 +401,21 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
             .map(|goal| crossed_fissures(resolved, goal))
             .unwrap_or_default(),
         judged: by_rules,
+    })
+}
+
+fn bend(resolved: &ResolvedScenario, placed: &PlacedPhantom, goal: &Goal) -> Option<BendAnswer> {
+    let needle = resolved.expected.as_ref()?.imperfections.tissue()?;
+    let path = goal.needle_path.as_ref()?;
+    let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+    let inserted = needle.insert(&needle.medians(), path, stand_off_m).ok()?;
+    // `ct` has the axes of the phantom.
+    let to_ct = placed.world_from_phantom.rotation.inverse() * goal.world_from_guide_exit.rotation;
+    let towards = needle.pushed_towards(path);
+    Some(BendAnswer {
+        path_m: bends_along_m(&inserted),
+        towards: towards.map(|[x, y]| (to_ct * Vector3::new(x, y, 0.0)).into()),
+        is_force_measured: needle.is_force_measured,
     })
 }
 

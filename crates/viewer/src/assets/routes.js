@@ -39,6 +39,15 @@ PLAN.routeRows = (columns, caption) => {
   row('Guide exit to tip', 'mm', (route) =>
     route.insertion_m === null ? '\u2013' : `${NB.mm(route.insertion_m)} (needle length ${NB.mm(route.needle_m)})`,
   );
+  if (columns.some(({ route }) => route?.bend))
+    row('Bend of the median needle', 'mm', ({ bend }) => {
+      if (!bend) return '\u2013';
+      const [, off] = bend.path_m[bend.path_m.length - 1];
+      const side = bend.towards
+        ? `towards ${PLAN.towards(bend.towards.map((value) => value * Math.sign(off)))}`
+        : 'to a side that is not known';
+      return `${NB.mm(Math.abs(off))} ${side}${bend.is_force_measured ? '' : ' (forces assumed)'}`;
+    });
   row('Angle to skin normal', '\u00b0', (route) => NB.deg(route.skin_angle_rad));
   row('Angle to axial plane', '\u00b0', (route) => NB.deg(route.axial_angle_rad));
   row('Length in lung', 'mm', (route) =>
@@ -56,7 +65,7 @@ PLAN.routeRows = (columns, caption) => {
       return NB.el('span', {
         class: known.kept ? 'good' : 'bad',
         text:
-          `${NB.mm(known.distance_m)}${off} to ${known.words}, ` +
+          `${NB.mm(known.distance_m)}${off} to ${known.words}${known.is_bent ? ' as tissue bends it' : ''}, ` +
           `${known.kept ? '' : 'rejected: '}${NB.mm(known.margin_m)} required`,
       });
     });

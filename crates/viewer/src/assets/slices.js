@@ -13,6 +13,7 @@ PLAN.PLANES = {
 
 PLAN.COLORS = {
   needle: NB.palette.yellow,
+  bent: '#fff',
   target: NB.palette.orange,
   entry: NB.palette.sky,
   cross: NB.palette.green,
@@ -111,6 +112,17 @@ class Picture {
    * @param {number[]} [dashes]
    */
   line(context, a, b, color, width, dashes = []) {
+    this.polyline(context, [a, b], color, width, dashes);
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {number[][]} points
+   * @param {string} color
+   * @param {number} width
+   * @param {number[]} [dashes]
+   */
+  polyline(context, points, color, width, dashes = []) {
     context.setLineDash(dashes);
     for (const [style, size] of /** @type {[string, number][]} */ ([
       ['rgba(0, 0, 0, 0.7)', width + 2],
@@ -119,8 +131,7 @@ class Picture {
       context.strokeStyle = style;
       context.lineWidth = size;
       context.beginPath();
-      context.moveTo(a[0], a[1]);
-      context.lineTo(b[0], b[1]);
+      for (const [x, y] of points) context.lineTo(x, y);
       context.stroke();
     }
     context.setLineDash([]);
@@ -414,13 +425,13 @@ class Slice extends Picture {
     const at = (share) => this.onCanvas(this.place(PLAN.add(from, PLAN.add(to, from, -1), share)));
     this.line(context, at(-15e-3 / route.length_m), at(1), PLAN.COLORS.needle, 1, [5, 4]);
     const half = Math.max(0.5, 1 / volume.spacing[w]);
-    const along = to[w] - from[w];
+    const across = to[w] - from[w];
     const shares =
-      Math.abs(along) < 1e-9
+      Math.abs(across) < 1e-9
         ? Math.abs(from[w] - slice) <= half
           ? [0, 1]
           : null
-        : [(slice - half - from[w]) / along, (slice + half - from[w]) / along].sort((a, b) => a - b);
+        : [(slice - half - from[w]) / across, (slice + half - from[w]) / across].sort((a, b) => a - b);
     if (shares && shares[0] < 1 && shares[1] > 0) {
       this.line(
         context,
@@ -430,6 +441,22 @@ class Slice extends Picture {
         Math.max(1e3 * facts.needle_diameter_m * this.scale, 2),
       );
     }
+    /** @param {Index} index */
+    const mm = (index) => index.map((value, axis) => value * volume.spacing[axis]);
+    const along = PLAN.unit(PLAN.add(mm(to), mm(from), -1));
+    const normal = [0, 1, 2].map((axis) => Number(axis === w));
+    // A needle along the normal bends to any side of the slice.
+    const aside =
+      Math.abs(along[w]) < 0.999
+        ? PLAN.unit(PLAN.cross(along, normal))
+        : [0, 1, 2].map((axis) => Number(axis === this.plane.u));
+    for (const bent of PLAN.bends(route, mm(from), along, aside))
+      this.polyline(
+        context,
+        bent.map((point) => this.onCanvas(this.place(point.map((value, axis) => value / volume.spacing[axis])))),
+        PLAN.COLORS.bent,
+        1,
+      );
     if (tip) {
       const axes = [
         [1, 0, 0],
@@ -649,8 +676,11 @@ class Probe extends Picture {
       return this.onCanvas([PLAN.dot(off, right), PLAN.dot(off, down)]);
     };
     const thick = Math.max(1e3 * facts.needle_diameter_m * this.scale, 2);
-    if (this.kind === 'along') this.line(context, flat(entry), flat(target), PLAN.COLORS.needle, thick);
-    else
+    if (this.kind === 'along') {
+      this.line(context, flat(entry), flat(target), PLAN.COLORS.needle, thick);
+      for (const bent of PLAN.bends(route, entry, right, down))
+        this.polyline(context, bent.map(flat), PLAN.COLORS.bent, 1);
+    } else
       this.ring(
         context,
         flat(PLAN.add(entry, PLAN.unit(PLAN.add(target, entry, -1)), this.planner.probe.depth)),
@@ -704,6 +734,21 @@ class Probe extends Picture {
     context.putImageData(image, 0, 0);
   }
 }
+
+/**
+ * Lines of the median needle as tissue bends it, mm of ct: two, to both sides of a view, if it is not known to which.
+ * @param {RouteAnswer} route
+ * @param {number[]} entry
+ * @param {number[]} along unit vector
+ * @param {number[]} aside unit vector in the view
+ */
+PLAN.bends = ({ bend }, entry, along, aside) => {
+  if (!bend) return [];
+  const sides = bend.towards ? [bend.towards] : [aside, aside.map((value) => -value)];
+  return sides.map((side) =>
+    bend.path_m.map(([depth, off]) => PLAN.add(PLAN.add(entry, along, 1e3 * depth), side, 1e3 * off)),
+  );
+};
 
 /** Letters of where a direction runs, the main one first: `A` or `AL`. */
 PLAN.towards = (direction) => {

@@ -117,6 +117,8 @@ interface RouteAnswer {
   target_index: Index;
   entry_moved_m: number;
   length_m: number;
+  /** How tissue bends the median needle: depths and how far it is off the straight line, m. */
+  bend: { path_m: [number, number][]; towards: Point | null; is_force_measured: boolean } | null;
   insertion_m: number | null;
   not_placed: Refusal | null;
   needle_m: number;
@@ -132,6 +134,7 @@ interface RouteAnswer {
     distance_m: number;
     margin_m: number;
     kept: boolean;
+    is_bent: boolean;
     surface_p99_m: number | null;
   }[];
   fissures: string[];
@@ -343,9 +346,11 @@ interface Planning {
 
   // slices.js
   PLANES: { [name: string]: Plane };
-  COLORS: Record<'needle' | 'target' | 'entry' | 'cross' | 'lesion' | 'marker' | 'error', string>;
+  COLORS: Record<'needle' | 'target' | 'entry' | 'cross' | 'lesion' | 'marker' | 'error' | 'bent', string>;
   SIGMAS_95: number;
   towards(direction: number[]): string;
+  /** Lines of the median needle as tissue bends it, mm of ct. */
+  bends(route: RouteAnswer, entry: number[], along: number[], aside: number[]): number[][][];
 
   // room.js, routes.js, simulation.js
   posture(motion: { time_s: number[]; joints_rad: number[][] }, time: number): number[];
