@@ -26,13 +26,16 @@ The case is a TOML file:
 
   [needle]     gauge (16 to 22), or outer_mm; inner_mm, stylet, young_gpa
   [held]       by = \"guide\" with guide_length_mm, bore_mm and standoff_mm,
-               by = \"clamp\" with standoff_mm, or by = \"hub\" with needle_length_mm
-  [tip]        point (bevel, symmetric or rolled), bevel_deg, towards_deg, turn_at_mm
+               by = \"clamp\" with standoff_mm, or by = \"hub\" with
+               needle_length_mm
+  [tip]        point (bevel, symmetric or rolled), bevel_deg, towards_deg,
+               turn_at_mm
   [[layers]]   length_mm, and a tissue (fat, wall, lung, lesion, gas, fluid) or
                stiffness_kn_m2 and force_n, which replace those of the tissue
-  [slip]       from_mm, by_mm: tissue that moves lateral to the needle afterwards
+  [slip]       from_mm, by_mm: tissue that moves sideways afterwards
 
-x is the guide's axis, from its exit on, y and z are across; towards_deg 0 is y, 90 is z.
+x is the guide's axis, from its exit on, y and z are across; towards_deg 0 is y,
+90 is z.
 
 Example: needlebench needle insert guide/examples/needle.toml --csv path.csv";
 
