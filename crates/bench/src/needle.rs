@@ -1,13 +1,14 @@
 //! How a goal's needle bends in tissue, and what can be done about it.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use needlebench_evaluation::report::{
-    BendSummary, BevelDirection, NeedleAlternative, NeedleLayer, NeedleReport, TurnedNeedle,
+    BendSummary, BevelDirection, NeedleAlternative, NeedleInBreath, NeedleLayer, NeedleReport,
+    TurnedNeedle,
 };
 use needlebench_insertion::{Gauge, Guide, Point, Tissue, WARNED_SLOPE};
 use needlebench_numerics::order::quantile_position;
 use needlebench_planning::bent_route;
-use needlebench_scenario::imperfections::{TissueNeedle, bend_at_m, bends_along_m};
+use needlebench_scenario::imperfections::{Breathing, TissueNeedle, bend_at_m, bends_along_m};
 use needlebench_scenario::{Goal, NeedlePath, PlacedPhantom, ResolvedScenario};
 use needlebench_uncertainty::{DRAWS, drawn_bends_m};
 
@@ -75,6 +76,10 @@ pub(crate) fn needle_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<
         turned: (has_direction && needle.turn_at_m.is_none()).then(|| turned(needle, goal, path)),
         aimed_rms_m: towards.map(|_| aimed_rms_m(needle, &sizes_m)),
         alternatives: alternatives(resolved, needle, goal),
+        breath: expected
+            .imperfections
+            .breathing
+            .and_then(|breathing| in_breath(needle, &breathing, goal, path, &to_patient)),
         faces: if has_direction {
             faces(resolved, placed, goal, path, &path_m)
         } else {
@@ -211,6 +216,39 @@ fn pleura_m(path: &NeedlePath) -> Option<f64> {
         .iter()
         .position(|layer| layer.tissue == Tissue::Lung)?;
     Some(path.layers[..lung].iter().map(|layer| layer.length_m).sum())
+}
+
+/// What a full breath does to a needle that is in.
+fn in_breath(
+    needle: &TissueNeedle,
+    breathing: &Breathing,
+    goal: &Goal,
+    path: &NeedlePath,
+    patient_from_guide: &UnitQuaternion<f64>,
+) -> Option<NeedleInBreath> {
+    let lateral_m =
+        |amplitude: Vector3<f64>| (patient_from_guide.inverse() * amplitude).xy().norm();
+    let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+    let off = |from_m: f64, by_m: f64| {
+        let carried = needle.carried(path, stand_off_m, from_m, by_m).ok()?;
+        Some(((carried.tip_m - by_m).abs(), carried.guide_n.abs()))
+    };
+    let (lung_slides_m, off_by_lung_m) = match pleura_m(path) {
+        Some(pleura_m) => {
+            let by_m = lateral_m(breathing.target_m - breathing.skin_m);
+            (by_m, off(pleura_m, by_m)?.0)
+        }
+        None => (0.0, 0.0),
+    };
+    let chest_moves_m = lateral_m(breathing.skin_m);
+    let (off_by_chest_m, guide_n) = off(0.0, chest_moves_m)?;
+    Some(NeedleInBreath {
+        lung_slides_m,
+        off_by_lung_m,
+        chest_moves_m,
+        off_by_chest_m,
+        guide_n,
+    })
 }
 
 /// The turn that leaves the least.

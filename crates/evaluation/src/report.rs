@@ -203,6 +203,9 @@ pub struct NeedleReport {
     pub aimed_rms_m: Option<f64>,
     /// What other needles, guides and hands would give.
     pub alternatives: Vec<NeedleAlternative>,
+    /// What a full breath does to the needle once it is in; none for a patient who does not breathe.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub breath: Option<NeedleInBreath>,
     /// For a tip that is pushed to one side: what the bent needle keeps from bone, vessels and organs for twelve directions of
     /// the bevel's face, the largest distance first.
     pub faces: Vec<BevelDirection>,
@@ -243,6 +246,22 @@ pub struct TurnedNeedle {
     pub at_m: f64,
     /// Root mean square of the bend then.
     pub rms_m: f64,
+}
+
+/// A needle that is in when the patient breathes in from the end of expiration: by medians, motions lateral to the needle
+/// alone, since tissue slides along it freely (assumed).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NeedleInBreath {
+    /// How far the lung slides along the wall; 0 for a needle that enters none.
+    pub lung_slides_m: f64,
+    /// How far that takes the tip off the lesion.
+    pub off_by_lung_m: f64,
+    /// How far the chest moves.
+    pub chest_moves_m: f64,
+    /// How far that takes the tip off the lesion while the guide holds the needle.
+    pub off_by_chest_m: f64,
+    /// The force that the guide holds it with then, N.
+    pub guide_n: f64,
 }
 
 /// Another needle, guide or hand.

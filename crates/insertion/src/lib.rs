@@ -17,6 +17,7 @@ mod guide;
 mod insertion;
 mod layers;
 mod needle;
+mod push;
 #[cfg(test)]
 mod tests;
 mod tissue;

@@ -259,6 +259,41 @@ fn another_programs_bends_are_met() {
     }
 }
 
+/// The free needle between guide and skin carries what is beyond it: the third derivative of its shape there, by its
+/// displacement and slope at both ends, is the push of the springs and the force across the tip.
+#[test]
+fn a_guide_holds_what_tissue_pushes() {
+    let needle = gauge(18);
+    let layers = layers(&[[0.02, 2e4, 0.08], [0.05, 2e3, 0.02], [0.01, 2e4, 0.08]]);
+    let stand_off_m = 0.02;
+    let cases = [(Holder::Clamp, EAST, 0.08), (guide(65e-6), [0.0; 2], 0.0)];
+    for (holder, towards, tip_n) in cases {
+        let bevel = bevel(towards);
+        let inserted = insert(&needle, &holder, stand_off_m, &layers, &bevel).unwrap();
+        let slip = Slip {
+            from_m: 0.03,
+            by_m: [4e-3, -2e-3],
+        };
+        let moved = inserted
+            .slipped(&needle, &holder, stand_off_m, &layers, &bevel, slip)
+            .unwrap();
+        let pushed_n = moved.pushed_n(&layers, Some(slip));
+        for (plane, tip_n) in [(0, tip_n), (1, 0.0)] {
+            let off_m = moved.shape_m[0][plane] - moved.exit_m[plane];
+            let [from, to] = [moved.exit_slope[plane], moved.slopes[0][plane]];
+            let middle = 0.5 * (from + to);
+            let bending_nm2 = needle.bending_stiffness_nm2();
+            let carried_n =
+                12.0 * bending_nm2 * (off_m - stand_off_m * middle) / stand_off_m.powi(3);
+            let total_n = pushed_n[plane] + tip_n;
+            assert!(
+                (total_n - carried_n).abs() < 1e-3 * carried_n.abs(),
+                "{total_n} {carried_n}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_slip_of_nothing_changes_nothing() {
     let tissue = layers(&[[0.03, 2e4, 0.1], [0.05, 2e3, 0.025], [0.01, 2e4, 0.1]]);

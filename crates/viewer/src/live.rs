@@ -10,8 +10,8 @@ use needlebench_input::Finding;
 use needlebench_planning::{crossed_fissures, judged_tissues};
 use needlebench_routing::body_normal;
 use needlebench_scenario::imperfections::bends_along_m;
-use needlebench_scenario::{Goal, PlacedPhantom, ResolvedScenario};
 use needlebench_scenario::scenario::{GoalSection, Target};
+use needlebench_scenario::{Goal, PlacedPhantom, ResolvedScenario};
 use needlebench_volume::{SurfaceTissue, VoxelGrid, structure_of};
 use serde::{Deserialize, Serialize};
 

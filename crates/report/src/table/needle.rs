@@ -67,6 +67,27 @@ pub(crate) fn needle_blocks(needle: &NeedleReport) -> Vec<Block> {
             worst.part,
         )]));
     }
+    if let Some(breath) = needle.breath {
+        let mut lines = Vec::new();
+        if breath.lung_slides_m > 0.0 {
+            lines.push(format!(
+                "a full breath once the needle is in: the lung slides {} mm along the wall, lateral to the needle: tip {} mm \
+                 off the lesion",
+                one(breath.lung_slides_m),
+                one(breath.off_by_lung_m)
+            ));
+        }
+        if breath.chest_moves_m > 0.0 {
+            lines.push(format!(
+                "a full breath in the closed guide: the chest moves {} mm lateral to the needle: tip {} mm off the lesion, \
+                 the guide holds it with {:.1} N; neither with the guide open",
+                one(breath.chest_moves_m),
+                one(breath.off_by_chest_m),
+                breath.guide_n
+            ));
+        }
+        blocks.push(Block::Lines(lines));
+    }
     blocks.push(Block::Lines(vec![format!(
         "assumed: {}",
         needle.assumed.join("; ")

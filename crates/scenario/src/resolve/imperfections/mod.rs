@@ -14,8 +14,8 @@ pub(crate) use arms::{RealArms, resolve_calibration};
 pub use localised::{Localisation, Markers, TargetLocalisation};
 pub(crate) use needle::KnownBends;
 pub use needle::{
-    Cantilever, NeedleBending, NeedleDraw, NeedlePath, TissueError, TissueNeedle, bend_at_m,
-    bends_along_m,
+    Cantilever, Carried, NeedleBending, NeedleDraw, NeedlePath, TissueError, TissueNeedle,
+    bend_at_m, bends_along_m,
 };
 pub use needlebench_cell::GearTwist;
 

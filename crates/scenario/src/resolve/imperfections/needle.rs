@@ -7,7 +7,7 @@ use needlebench_cell::Tool;
 use needlebench_input::{Finding, Location, ModelSource, TomlText, from_toml, source_of};
 use needlebench_insertion::{
     Bevel, Factor, Guide, Holder, Insertion, InsertionError, Layers, LayersError, Needle, Point,
-    Tissue,
+    Slip, Tissue,
 };
 use needlebench_phantom::PassedLayer;
 use serde::Deserialize;
@@ -191,6 +191,39 @@ impl TissueNeedle {
         self.inserted(draw, path, stand_off_m, needlebench_insertion::insert)
     }
 
+    /// What a needle that is in does when the tissue beyond a depth moves lateral to it by some distance while the guide holds it:
+    /// by medians, without the bend that it has. Along the motion.
+    ///
+    /// # Errors
+    /// [`TissueError`] as of [`Self::insert`].
+    pub fn carried(
+        &self,
+        path: &NeedlePath,
+        stand_off_m: f64,
+        from_m: f64,
+        by_m: f64,
+    ) -> Result<Carried, TissueError> {
+        let medians = self.medians();
+        let layers = self.layers(&medians, path)?;
+        let (needle, holder) = (&medians.needle, Holder::Guide(self.guide));
+        let bevel = Bevel {
+            towards: [0.0; 2],
+            angle_rad: self.bevel_rad,
+            turn_at_m: None,
+        };
+        let slip = Slip {
+            from_m,
+            by_m: [by_m, 0.0],
+        };
+        let straight =
+            needlebench_insertion::insert(needle, &holder, stand_off_m, &layers, &bevel)?;
+        let moved = straight.slipped(needle, &holder, stand_off_m, &layers, &bevel, slip)?;
+        Ok(Carried {
+            tip_m: moved.tip_m()[0],
+            guide_n: moved.pushed_n(&layers, Some(slip))[0],
+        })
+    }
+
     /// How far the tip is off the axis where it pierces the skin and at the end of its way, m, towards where it is pushed.
     ///
     /// # Errors
@@ -237,6 +270,15 @@ pub fn bends_along_m(inserted: &Insertion) -> Vec<[f64; 2]> {
 /// Stiffest tissue, N/m2, and strongest force across a tip, N, that the solver takes.
 const STIFFEST_N_M2: f64 = 1e6;
 const STRONGEST_N: f64 = 5.0;
+
+/// A needle that moving tissue takes along.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Carried {
+    /// How far the tip goes, m.
+    pub tip_m: f64,
+    /// The force that the guide holds the needle with, N.
+    pub guide_n: f64,
+}
 
 /// A needle, and the tissues of a patient.
 #[derive(Debug, Clone, Copy, PartialEq)]

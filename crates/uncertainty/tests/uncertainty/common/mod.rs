@@ -28,7 +28,7 @@ diametral_clearance_mm = 0.15
 [imperfections.skin_markers]
 [imperfections.imaging]
 [imperfections.needle]
-model = "cantilever"
+model = \"cantilever\"
 [imperfections.indentation]
 [imperfections.breathing]
 hold_failure = 0
