@@ -40,6 +40,12 @@ pub(crate) struct Seat {
 pub(crate) struct Answer {
     pub slope: Vector2<f64>,
     pub force_n: Vector2<f64>,
+    pub by: Held,
+}
+
+/// Slope and force at the exit by a displacement and a moment there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Held {
     pub slope_by_exit: f64,
     pub slope_by_moment: f64,
     pub force_by_exit: f64,
@@ -48,18 +54,49 @@ pub(crate) struct Answer {
 /// Rounds of the balance between both ends of the bore: most cases need two.
 const ROUNDS: usize = 200;
 
-/// Halves of the play until the place of an exit is known, to a part in 1e12.
-const HALVES: usize = 40;
+/// Steps until the place of an exit is known, to this part of the play: halves of the play would need 40.
+const STEPS: usize = 60;
+const EXIT: f64 = 1e-12;
 
-impl Guide {
+/// A guide with a needle in it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bore {
+    length_m: f64,
+    pub play_m: f64,
+    bending_nm2: f64,
     /// Stiffness against rotation at the exit of a beam on two supports, N m.
-    pub(crate) fn rotation_nm(&self, bending_nm2: f64) -> f64 {
-        3.0 * bending_nm2 / self.length_m
+    pub rotation_nm: f64,
+    /// The same by the length of the bore, N.
+    shear_n: f64,
+    /// Slope of a needle that leans on one wall at the entry and on the other one at the exit.
+    pub lean: f64,
+}
+
+impl Bore {
+    /// Of a guide, and the needle's bending stiffness, N m2.
+    pub fn new(guide: &Guide, bending_nm2: f64) -> Self {
+        let Guide { length_m, play_m } = *guide;
+        let rotation_nm = 3.0 * bending_nm2 / length_m;
+        Self {
+            length_m,
+            play_m,
+            bending_nm2,
+            rotation_nm,
+            shear_n: rotation_nm / length_m,
+            lean: 2.0 * play_m / length_m,
+        }
     }
 
-    /// Slope of the needle where it leans on one wall at the entry and on the other at the exit.
-    pub(crate) fn lean(&self) -> f64 {
-        2.0 * self.play_m / self.length_m
+    /// Displacement, m, and moment, N m, at the exit of a needle that is pressed to the wall on one side (1 or -1) at the
+    /// exit and on the other one at the entry.
+    pub fn leaning(&self, side: f64) -> [f64; 2] {
+        [self.play_m * side, self.lean * self.rotation_nm * side]
+    }
+
+    /// Whether it is pressed there, by slope and force at the exit, and leaves the wall at the entry (see [`Self::seat`]).
+    pub fn leans(&self, side: f64, [slope, force_n]: [f64; 2]) -> bool {
+        let off = slope * side - self.lean;
+        off >= 0.0 && off <= 2.0 * self.lean && force_n * side <= off * self.shear_n
     }
 
     /// Where the needle comes to rest in the bore.
@@ -68,14 +105,19 @@ impl Guide {
     /// at the exit and to the other at the entry, and is a beam on two supports. Where that would press it into the wall
     /// behind the entry, it lies on the wall and leaves it at a distance g' before the exit, with neither slope nor moment
     /// there: off the wall by s at the exit its slope is 3 s / g', and its moment 6 EI s / g'^2 = 2 EI slope^2 / (3 s).
-    pub(crate) fn seat(&self, bending_nm2: f64, answer: &Answer) -> Seat {
-        let Self { length_m, play_m } = *self;
-        let rotation_nm = self.rotation_nm(bending_nm2);
-        let Answer {
+    pub fn seat(&self, answer: &Answer) -> Seat {
+        let Self {
+            length_m,
+            play_m,
+            rotation_nm,
+            shear_n: shear,
+            ..
+        } = *self;
+        let Held {
             slope_by_exit,
             slope_by_moment,
-            ..
-        } = *answer;
+            force_by_exit,
+        } = answer.by;
         let bent = answer.slope.norm();
         if bent == 0.0 {
             return Seat {
@@ -94,14 +136,13 @@ impl Guide {
             )
         };
         // Energy's second derivatives by the displacement at the entry and at the exit.
-        let shear = rotation_nm / length_m;
         let of_entry = shear * (1.0 - slope_by_moment * rotation_nm) / length_m;
-        let of_exit = answer.force_by_exit - 2.0 * shear * slope_by_exit + of_entry;
+        let of_exit = force_by_exit - 2.0 * shear * slope_by_exit + of_entry;
         for _ in 0..ROUNDS {
             let (slope, chord) = slope_of(exit_m, entry_m);
             let now = within(entry_m, (slope - chord) * shear, of_entry, play_m);
             let (slope, chord) = slope_of(exit_m, now);
-            let force_n = answer.force_n + exit_m * answer.force_by_exit
+            let force_n = answer.force_n + exit_m * force_by_exit
                 - chord * (rotation_nm * slope_by_exit)
                 - (slope - chord) * shear;
             let next = within(exit_m, force_n, of_exit, play_m);
@@ -117,7 +158,8 @@ impl Guide {
         let away = entry_m * (-1.0 / play_m);
         let is_there = play_m > 0.0 && away.norm() > 1.0 - 1e-9;
         if is_there && slope.dot(&away) > 3.0 * chord.dot(&away) {
-            let on_wall = self.on_wall(bending_nm2, answer, &away);
+            let along = [answer.slope, answer.force_n].map(|each| each.dot(&away));
+            let on_wall = self.on_wall(along, &answer.by);
             exit_m += away * (on_wall.exit_m - exit_m.dot(&away));
             moment_nm += away * (on_wall.moment_nm - moment_nm.dot(&away));
             slope += away * (on_wall.slope - slope.dot(&away));
@@ -129,23 +171,28 @@ impl Guide {
         }
     }
 
-    /// A needle that lies on the wall from the entry on, with its exit on the other wall or before it.
-    fn on_wall(&self, bending_nm2: f64, answer: &Answer, away: &Vector2<f64>) -> OnWall {
-        let Self { play_m, .. } = *self;
-        let rotation_nm = self.rotation_nm(bending_nm2);
-        let [slope, force_n] = [answer.slope, answer.force_n].map(|each| each.dot(away));
+    /// A needle that lies on the wall from the entry on, with its exit on the other wall or before it; slope and force along
+    /// the direction away from that wall.
+    fn on_wall(&self, [slope, force_n]: [f64; 2], by: &Held) -> OnWall {
+        let Self {
+            play_m,
+            bending_nm2,
+            rotation_nm,
+            ..
+        } = *self;
         // With the exit at a displacement: what it is then, and what has to hold it.
         let at = |exit_m: f64| {
             let off_m = exit_m + play_m;
             // slope = bare + by_moment (rotation slope - 2 EI slope^2 / (3 off))
-            let bare = (slope + answer.slope_by_exit * exit_m).max(0.0);
-            let a = answer.slope_by_moment * bending_nm2 / (1.5 * off_m);
-            let b = 1.0 - answer.slope_by_moment * rotation_nm;
-            let slope = 2.0 * bare / (b + (b * b + 4.0 * a * bare).sqrt());
-            let wall_nm = bending_nm2 * slope * slope / (1.5 * off_m);
+            let bare = (slope + by.slope_by_exit * exit_m).max(0.0);
+            let bend = bending_nm2 / (1.5 * off_m);
+            let b = 1.0 - by.slope_by_moment * rotation_nm;
+            let root = (b * b + 4.0 * by.slope_by_moment * bend * bare).sqrt();
+            let slope = 2.0 * bare / (b + root);
+            let wall_nm = bend * slope * slope;
             let moment_nm = rotation_nm * slope - wall_nm;
-            let held_n = force_n + answer.force_by_exit * exit_m
-                - answer.slope_by_exit * moment_nm
+            let held_n = force_n + by.force_by_exit * exit_m
+                - by.slope_by_exit * moment_nm
                 - wall_nm * slope / (3.0 * off_m);
             let found = OnWall {
                 exit_m,
@@ -154,18 +201,28 @@ impl Guide {
             };
             (found, held_n)
         };
-        let (mut found, held_n) = at(play_m);
-        if held_n > 0.0 {
-            // The wall at the exit would have to pull.
-            let (mut low_m, mut high_m) = (-play_m, play_m);
-            for _ in 0..HALVES {
-                let (middle, held_n) = at(0.5 * (low_m + high_m));
-                found = middle;
-                if held_n > 0.0 {
-                    high_m = middle.exit_m;
-                } else {
-                    low_m = middle.exit_m;
-                }
+        let (mut found, mut held_n) = at(play_m);
+        if held_n <= 0.0 {
+            return found;
+        }
+        // The wall at the exit would have to pull: by secants, or halves where they lead out.
+        let (mut low_m, mut high_m) = (-play_m, play_m);
+        let mut next_m = 0.0;
+        for _ in 0..STEPS {
+            let before = (found.exit_m, held_n);
+            (found, held_n) = at(next_m);
+            if held_n > 0.0 {
+                high_m = next_m;
+            } else {
+                low_m = next_m;
+            }
+            let change_m = held_n * (next_m - before.0) / (held_n - before.1);
+            if change_m.is_nan() || change_m.abs() <= EXIT * play_m {
+                break;
+            }
+            next_m -= change_m;
+            if next_m <= low_m || next_m >= high_m {
+                next_m = 0.5 * (low_m + high_m);
             }
         }
         found

@@ -119,6 +119,7 @@ fn at_once(
     first_m: f64,
 ) -> Vec<f64> {
     let mut path = vec![0.0];
+    let mut force_n = case.force_n();
     for tip in 1..=elements.len() {
         let lengths: Vec<(f64, f64)> = std::iter::once((first_m, 0.0))
             .chain(elements[..tip].iter().copied())
@@ -177,7 +178,7 @@ fn at_once(
                 }
             }
         }
-        right[size - 2] += case.force_n(depth_m)[0];
+        right[size - 2] += force_n(depth_m);
         matrix[(1, 1)] += rotation_nm;
         // The exit is a support.
         let matrix = matrix.remove_row(0).remove_column(0);
@@ -205,20 +206,17 @@ fn elimination_is_the_whole_system_at_each_step() {
     };
     let holder = guide(0.0);
     let case = Case::new(&needle, &holder, 0.012, &tissue, &turned, 2e-3).unwrap();
-    let elements: Vec<(f64, f64)> = case
-        .depths_m
-        .windows(2)
-        .map(|ends| {
-            let middle_m = 0.5 * (ends[0] + ends[1]);
-            let layer = tissue.ends_m().iter().position(|&end_m| middle_m < end_m);
-            (
-                ends[1] - ends[0],
-                tissue.all()[layer.unwrap()].stiffness_n_m2,
-            )
-        })
-        .collect();
+    let mut elements = Vec::new();
+    case.elements(|element, depth_m| {
+        let middle_m = depth_m - 0.5 * element.length_m;
+        let layer = tissue.ends_m().iter().position(|&end_m| middle_m < end_m);
+        elements.push((
+            element.length_m,
+            tissue.all()[layer.unwrap()].stiffness_n_m2,
+        ));
+    });
     let wanted = at_once(&case, &elements, ei, 3.0 * ei / 0.05, 0.012);
-    let found = case.cut();
+    let found = case.path();
     assert_eq!(found.len(), wanted.len());
     for (found, wanted) in found.iter().zip(&wanted) {
         // What both round.
@@ -352,7 +350,7 @@ proptest! {
         let of = |element_m: f64| {
             let good = bevel(EAST);
             let case = Case::new(&needle, &holder, stand_off_m, &tissue, &good, element_m).unwrap();
-            let path = case.cut();
+            let path = case.path();
             case.shape(path, None).tip_m()[0]
         };
         let (usual, fine) = (of(0.6e-3), of(0.12e-3));
@@ -508,8 +506,8 @@ fn links_with_finite_angles_bend_as_much() {
         let tissue = layers(&all);
         let (needle, holder, good) = (gauge(number), Holder::Clamp, bevel(EAST));
         let case = Case::new(&needle, &holder, 0.01, &tissue, &good, 0.6e-3).unwrap();
-        let ours = case.shape(case.cut(), None).tip_m()[0];
-        let force_n = |depth_m: f64| case.force_n(depth_m)[0];
+        let ours = case.shape(case.path(), None).tip_m()[0];
+        let force_n = |depth_m: f64| case.force_n()(depth_m);
         // Links are off in proportion to their length.
         let [coarse, fine] =
             [1e-3, 5e-4].map(|link_m| by_links(&needle, 0.01, &tissue, force_n, link_m)[1]);
