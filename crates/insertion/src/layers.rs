@@ -122,20 +122,62 @@ impl Layers {
     pub fn ends_m(&self) -> &[f64] {
         &self.ends_m
     }
+}
 
-    /// The integral of the tip's force from the skin to a depth, with its sign before and behind `turn_at_m`, N m.
-    pub(crate) fn impulse_nm(&self, depth_m: f64, turn_at_m: Option<f64>) -> f64 {
-        let mut from_m = 0.0;
-        let mut sum = 0.0;
-        for (layer, &end_m) in self.all.iter().zip(&self.ends_m) {
-            let to_m = end_m.min(depth_m);
-            if to_m <= from_m {
-                break;
-            }
-            let turned_m = turn_at_m.map_or(0.0, |turn_m| (to_m - turn_m.max(from_m)).max(0.0));
-            sum += layer.force_n * (to_m - from_m - 2.0 * turned_m);
-            from_m = end_m;
+/// The integral of the tip's force from the skin on, with its sign before and behind a turn.
+pub(crate) struct Impulse<'l> {
+    layers: std::slice::Iter<'l, Layer>,
+    /// Where the tip is turned and has not been yet, m.
+    turn_at_m: f64,
+    sign: f64,
+    /// The last layer that was reached: its end, m, and its force, N.
+    end_m: f64,
+    layer_n: f64,
+    /// Of one force: from where, with what is summed up to there, to where.
+    from_m: f64,
+    sum_nm: f64,
+    to_m: f64,
+    force_n: f64,
+}
+
+impl<'l> Impulse<'l> {
+    pub fn new(layers: &'l Layers, turn_at_m: Option<f64>) -> Self {
+        Self {
+            layers: layers.all.iter(),
+            turn_at_m: turn_at_m.unwrap_or(f64::INFINITY),
+            sign: 1.0,
+            end_m: 0.0,
+            layer_n: 0.0,
+            from_m: 0.0,
+            sum_nm: 0.0,
+            to_m: 0.0,
+            force_n: 0.0,
         }
-        sum
+    }
+
+    /// Up to a depth that is not before the last one, N m.
+    #[inline(always)]
+    pub fn until_nm(&mut self, depth_m: f64) -> f64 {
+        while depth_m > self.to_m {
+            self.go_on();
+        }
+        self.sum_nm + self.force_n * (depth_m - self.from_m)
+    }
+
+    /// Into the next layer, or behind the turn.
+    #[inline(never)]
+    fn go_on(&mut self) {
+        self.sum_nm += self.force_n * (self.to_m - self.from_m);
+        self.from_m = self.to_m;
+        if self.from_m >= self.turn_at_m {
+            (self.turn_at_m, self.sign) = (f64::INFINITY, -1.0);
+        }
+        if self.from_m >= self.end_m {
+            let next = self.layers.next();
+            self.end_m += next.map_or(f64::INFINITY, |layer| layer.length_m);
+            self.layer_n = next.map_or(0.0, |layer| layer.force_n);
+        }
+        self.to_m = self.end_m.min(self.turn_at_m);
+        self.force_n = self.layer_n * self.sign;
     }
 }

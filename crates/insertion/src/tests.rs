@@ -1,8 +1,9 @@
 //! Closed forms, a whole new system at each step, and finer elements.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector2};
 use proptest::prelude::*;
 
+use crate::guide::{Answer, Bore, Held, Rest};
 use crate::insertion::Case;
 use crate::*;
 
@@ -119,6 +120,7 @@ fn at_once(
     first_m: f64,
 ) -> Vec<f64> {
     let mut path = vec![0.0];
+    let mut force_n = case.force_n();
     for tip in 1..=elements.len() {
         let lengths: Vec<(f64, f64)> = std::iter::once((first_m, 0.0))
             .chain(elements[..tip].iter().copied())
@@ -177,7 +179,7 @@ fn at_once(
                 }
             }
         }
-        right[size - 2] += case.force_n(depth_m)[0];
+        right[size - 2] += force_n(depth_m);
         matrix[(1, 1)] += rotation_nm;
         // The exit is a support.
         let matrix = matrix.remove_row(0).remove_column(0);
@@ -205,20 +207,17 @@ fn elimination_is_the_whole_system_at_each_step() {
     };
     let holder = guide(0.0);
     let case = Case::new(&needle, &holder, 0.012, &tissue, &turned, 2e-3).unwrap();
-    let elements: Vec<(f64, f64)> = case
-        .depths_m
-        .windows(2)
-        .map(|ends| {
-            let middle_m = 0.5 * (ends[0] + ends[1]);
-            let layer = tissue.ends_m().iter().position(|&end_m| middle_m < end_m);
-            (
-                ends[1] - ends[0],
-                tissue.all()[layer.unwrap()].stiffness_n_m2,
-            )
-        })
-        .collect();
+    let mut elements = Vec::new();
+    case.elements(|element, depth_m| {
+        let middle_m = depth_m - 0.5 * element.length_m;
+        let layer = tissue.ends_m().iter().position(|&end_m| middle_m < end_m);
+        elements.push((
+            element.length_m,
+            tissue.all()[layer.unwrap()].stiffness_n_m2,
+        ));
+    });
     let wanted = at_once(&case, &elements, ei, 3.0 * ei / 0.05, 0.012);
-    let found = case.cut();
+    let found = case.path();
     assert_eq!(found.len(), wanted.len());
     for (found, wanted) in found.iter().zip(&wanted) {
         // What both round.
@@ -292,6 +291,38 @@ fn a_guide_holds_what_tissue_pushes() {
             );
         }
     }
+}
+
+/// Where nothing bends a needle, whether it lies on the wall of its guide is a question of rounding.
+#[test]
+fn a_layer_without_force_is_passed() {
+    let needle = Needle {
+        young_pa: 209_728_022_065.727_17,
+        ..gauge(18)
+    };
+    let holder = Holder::Guide(Guide {
+        length_m: 0.099_507_862_943_235_85,
+        play_m: 7.418_968_678_028_867e-6,
+    });
+    let tissue = layers(&[
+        [0.005_040_923_998_929_266, 6_886.714_671_837_535, 0.0],
+        [
+            0.013_895_385_709_197_027,
+            835.807_414_302_428_5,
+            0.096_245_996_501_426_35,
+        ],
+    ]);
+    let steep = Bevel {
+        angle_rad: 0.958_923_777_928_847_1,
+        ..bevel(EAST)
+    };
+    let [_, [tip_m, _]] = ends(&needle, &holder, 0.0, &tissue, &steep).unwrap();
+    // Farther than by the play, and not as far as without tissue.
+    let (length_m, bore_m, force_n) = (tissue.depth_m(), 0.0995, 0.0963);
+    let in_air_m = force_n * length_m * length_m * (length_m + bore_m)
+        / (3.0 * needle.bending_stiffness_nm2())
+        + 7.42e-6 * (1.0 + 2.0 * length_m / bore_m);
+    assert!(tip_m > 7.42e-6 && tip_m < in_air_m, "{tip_m} {in_air_m}");
 }
 
 #[test]
@@ -387,7 +418,7 @@ proptest! {
         let of = |element_m: f64| {
             let good = bevel(EAST);
             let case = Case::new(&needle, &holder, stand_off_m, &tissue, &good, element_m).unwrap();
-            let path = case.cut();
+            let path = case.path();
             case.shape(path, None).tip_m()[0]
         };
         let (usual, fine) = (of(0.6e-3), of(0.12e-3));
@@ -406,6 +437,37 @@ proptest! {
         prop_assert!((y - along * turned[0]).abs() < 1e-12 && (z - along * turned[1]).abs() < 1e-12);
         let [y, z] = of([-turned[0], -turned[1]]);
         prop_assert!((y + along * turned[0]).abs() < 1e-12 && (z + along * turned[1]).abs() < 1e-12);
+    }
+
+    /// The closed form along a line against rounds of both ends in the plane.
+    #[test]
+    fn a_needle_comes_to_rest_in_its_bore(
+        stiffness in (0.01..1.0, 0.1..3.0, -0.8..0.8),
+        by_lean in (-2.0..6.0, -4.0..4.0),
+        play_m in 1e-5..3e-4,
+        angle in 0.0..6.2,
+    ) {
+        let bending_nm2 = gauge(20).bending_stiffness_nm2();
+        let bore = Guide { length_m: 0.05, play_m };
+        let shear_n = 3.0 * bending_nm2 / (0.05 * 0.05);
+        let bore = Bore::new(&bore, bending_nm2);
+        let (slope, force_n) = (by_lean.0 * bore.lean, by_lean.1 * bore.lean * shear_n);
+        // Of the entry, of the exit and of both: positive definite.
+        let (entry, exit, both) = stiffness;
+        let (of_entry, of_exit) = (entry * shear_n / 0.05, exit * shear_n / 0.05);
+        let of_both = both * f64::sqrt(of_entry * of_exit);
+        let slope_by_exit = (of_both + of_entry) / shear_n;
+        let by = Held {
+            slope_by_exit,
+            slope_by_moment: (1.0 - entry) / bore.rotation_nm,
+            force_by_exit: of_exit + 2.0 * shear_n * slope_by_exit - of_entry,
+        };
+        let Rest { exit_m, moment_nm, .. } = bore.seat_along([force_n, slope], &by, &Rest::MIDDLE);
+        let along = Vector2::new(libm::cos(angle), libm::sin(angle));
+        let seat = bore.seat(&Answer { slope: along * slope, force_n: along * force_n, by });
+        prop_assert!((seat.exit_m - along * exit_m).norm() < 1e-6 * play_m, "{} {}", seat.exit_m, exit_m);
+        let moment = bore.rotation_nm * bore.lean;
+        prop_assert!((seat.moment_nm - along * moment_nm).norm() < 1e-6 * moment, "{} {}", seat.moment_nm, moment_nm);
     }
 
     #[test]
@@ -543,8 +605,8 @@ fn links_with_finite_angles_bend_as_much() {
         let tissue = layers(&all);
         let (needle, holder, good) = (gauge(number), Holder::Clamp, bevel(EAST));
         let case = Case::new(&needle, &holder, 0.01, &tissue, &good, 0.6e-3).unwrap();
-        let ours = case.shape(case.cut(), None).tip_m()[0];
-        let force_n = |depth_m: f64| case.force_n(depth_m)[0];
+        let ours = case.shape(case.path(), None).tip_m()[0];
+        let force_n = |depth_m: f64| case.force_n()(depth_m);
         // Links are off in proportion to their length.
         let [coarse, fine] =
             [1e-3, 5e-4].map(|link_m| by_links(&needle, 0.01, &tissue, force_n, link_m)[1]);
