@@ -26,6 +26,8 @@ JOINTS = {
     "wrist_2_joint": "wrist_2",
     "wrist_3_joint": "wrist_3",
 }
+# Outer diameters of needles by gauge, from a chart of the Birmingham gauge.
+OUTER_M = {16: 1.651e-3, 17: 1.473e-3, 18: 1.270e-3, 19: 1.067e-3, 20: 0.908e-3, 21: 0.819e-3, 22: 0.718e-3}
 Array = np.ndarray
 
 

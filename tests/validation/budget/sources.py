@@ -7,6 +7,7 @@ it - where the arm comes to rest, where the needle and the target are - is `erro
 import pickle
 from dataclasses import dataclass, field
 
+import bending
 import numpy as np
 from model import (
     GRAVITY_M_S2,
@@ -56,6 +57,8 @@ class Case:
     path: Array  # joint positions at these times
     timestep: float
     blocks: dict  # [imperfections], by name
+    layers: list[tuple[str, float]] = field(default_factory=list)  # tissue and length, from the skin on
+    pushed_towards: Array | None = None  # of a bevel of known direction: along the first two axes
 
 
 @dataclass
@@ -270,12 +273,15 @@ def friction(
     truth.friction = values
 
 
+def clearance_of(case: Case, block: dict) -> float:
+    """What the guide's bore is wider than the needle."""
+    given = block.get("diametral_clearance_mm")
+    return case.arm.tool.bore - case.arm.tool.needle if given is None else given * 1e-3
+
+
 def guide(case: Case, block: dict, random: np.random.Generator, truth: Truth) -> None:
     """The needle's axis anywhere in a disc at each end of the guide."""
-    tool = case.arm.tool
-    given = block.get("diametral_clearance_mm")
-    clearance = tool.bore - tool.needle if given is None else given * 1e-3
-    radius = 0.5 * clearance * np.sqrt(random.random((truth.count, 2)))
+    radius = 0.5 * clearance_of(case, block) * np.sqrt(random.random((truth.count, 2)))
     angle = random.uniform(0.0, 2.0 * np.pi, (truth.count, 2))
     truth.in_guide = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
@@ -399,7 +405,10 @@ def imaging(case: Case, block: dict, random: np.random.Generator, truth: Truth) 
 
 
 def needle(case: Case, block: dict, random: np.random.Generator, truth: Truth) -> None:
-    """A force across the tip, in any direction, bends the needle from the guide's exit on."""
+    """A force across the tip, in any direction, bends the needle from the guide's exit on; or it cuts its way."""
+    if block["model"] == "tissue":
+        needle_in_tissue(case, block, random, truth)
+        return
     outer, bore = case.arm.tool.needle, block["bore_mm"] * 1e-3
     rigidity = block["young_gpa"] * 1e9 * np.pi * (outer**4 - bore**4) / 64.0
     # Squares of the force are exponential: its parts along two axes are normal.
@@ -413,6 +422,36 @@ def needle(case: Case, block: dict, random: np.random.Generator, truth: Truth) -
             for s in case.depths
         ]
     )
+
+
+def needle_in_tissue(
+    case: Case, block: dict, random: np.random.Generator, truth: Truth
+) -> None:
+    """Needles of many patients, in any direction or in that of the bevel as the hand holds it.
+
+    What the play of the guide does is part of it, as the force presses the needle to the walls.
+    """
+    tool = case.arm.tool
+    play = 0.5 * clearance_of(case, case.blocks["guide"]) if "guide" in case.blocks else 0.0
+    held = (tool.guide_length, case.depths[0], play)
+    of = pickle.dumps((block, case.layers, tool.needle, held))
+    if of not in KNOWN_BENDS:
+        KNOWN_BENDS[of] = bending.bends(block, case.layers, tool.needle, held, np.random.default_rng(23))
+    known = KNOWN_BENDS[of]
+    # Each once, as far as there are so many.
+    order = random.permutation(known.shape[1])
+    bends = known[:, np.resize(order, truth.count)]
+    if case.pushed_towards is None:
+        angle = random.uniform(0.0, 2.0 * np.pi, truth.count)
+    else:
+        middle = np.arctan2(case.pushed_towards[1], case.pushed_towards[0])
+        angle = middle + np.radians(block["bevel_spread_deg"]) * random.standard_normal(truth.count)
+    towards = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
+    truth.bent = bends[..., None] * towards
+
+
+# By what a goal's bends depend on: the same for all its configurations.
+KNOWN_BENDS: dict[bytes, Array] = {}
 
 
 def indentation(
