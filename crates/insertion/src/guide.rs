@@ -171,6 +171,54 @@ impl Bore {
         }
     }
 
+    /// [`Self::seat`] of a needle that is bent along one line, by slope and force there: displacement, m, and moment, N m, at
+    /// the exit. The balance of both ends has a closed form then.
+    pub fn seat_along(&self, [slope, force_n]: [f64; 2], by: &Held) -> [f64; 2] {
+        let Self {
+            length_m,
+            play_m,
+            rotation_nm,
+            shear_n: shear,
+            ..
+        } = *self;
+        if slope == 0.0 {
+            return [0.0; 2];
+        }
+        // Energy's derivatives by the displacement at the entry and at the exit: `pull` without any.
+        let of_entry = shear * (1.0 - by.slope_by_moment * rotation_nm) / length_m;
+        let of_both = shear * by.slope_by_exit - of_entry;
+        let of_exit = by.force_by_exit - 2.0 * shear * by.slope_by_exit + of_entry;
+        let pull = [slope * shear, force_n - slope * shear];
+        let moved = |pull_n: f64, stiffness_n_m: f64| {
+            if stiffness_n_m * play_m > pull_n.abs() {
+                -pull_n / stiffness_n_m
+            } else {
+                -play_m.copysign(pull_n)
+            }
+        };
+        let entry = |exit_m: f64| moved(pull[0] + of_both * exit_m, of_entry);
+        // With the entry wherever it comes to rest, the force at the exit rises with its displacement.
+        let pressed = [play_m, -play_m]
+            .into_iter()
+            .find(|exit_m| (pull[1] + of_both * entry(*exit_m) + of_exit * exit_m) * exit_m <= 0.0);
+        let [entry_m, exit_m] = if let Some(exit_m) = pressed {
+            [entry(exit_m), exit_m]
+        } else {
+            let both = of_entry * of_exit - of_both * of_both;
+            let entry_m = moved(of_exit * pull[0] - of_both * pull[1], both);
+            [entry_m, moved(pull[1] + of_both * entry_m, of_exit)]
+        };
+        let chord = (exit_m - entry_m) / length_m;
+        let moment_nm = chord * rotation_nm;
+        let side = 1.0_f64.copysign(-entry_m);
+        let bent = slope + by.slope_by_exit * exit_m + by.slope_by_moment * moment_nm;
+        if entry_m.abs() < play_m || bent * side <= 3.0 * chord * side {
+            return [exit_m, moment_nm];
+        }
+        let found = self.on_wall([slope * side, force_n * side], by);
+        [found.exit_m, found.moment_nm].map(|each| each * side)
+    }
+
     /// A needle that lies on the wall from the entry on, with its exit on the other wall or before it; slope and force along
     /// the direction away from that wall.
     fn on_wall(&self, [slope, force_n]: [f64; 2], by: &Held) -> OnWall {

@@ -410,12 +410,7 @@ impl<'c> Case<'c> {
         let (tip_m, by_load) = tip.answer(&load, [0.0; 2]);
         let [(tip_by_exit, by_exit), (tip_by_moment, by_moment)] =
             [[1.0, 0.0], [0.0, 1.0]].map(|exit| tip.answer(&Load::default(), exit));
-        let seat = bore.seat(&Answer {
-            slope: Vector2::new(by_load[0], 0.0),
-            force_n: Vector2::new(by_load[1], 0.0),
-            by: held(by_exit, by_moment),
-        });
-        let (exit_m, moment_nm) = (seat.exit_m.x, seat.moment_nm.x);
+        let [exit_m, moment_nm] = bore.seat_along(by_load, &held(by_exit, by_moment));
         let tip_m = tip_m + tip_by_exit * exit_m + tip_by_moment * moment_nm;
         (tip_m, 1.0_f64.copysign(exit_m))
     }

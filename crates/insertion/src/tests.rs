@@ -1,8 +1,9 @@
 //! Closed forms, a whole new system at each step, and finer elements.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector2};
 use proptest::prelude::*;
 
+use crate::guide::{Answer, Bore, Held};
 use crate::insertion::Case;
 use crate::*;
 
@@ -369,6 +370,37 @@ proptest! {
         prop_assert!((y - along * turned[0]).abs() < 1e-12 && (z - along * turned[1]).abs() < 1e-12);
         let [y, z] = of([-turned[0], -turned[1]]);
         prop_assert!((y + along * turned[0]).abs() < 1e-12 && (z + along * turned[1]).abs() < 1e-12);
+    }
+
+    /// The closed form along a line against rounds of both ends in the plane.
+    #[test]
+    fn a_needle_comes_to_rest_in_its_bore(
+        stiffness in (0.01..1.0, 0.1..3.0, -0.8..0.8),
+        by_lean in (-2.0..6.0, -4.0..4.0),
+        play_m in 1e-5..3e-4,
+        angle in 0.0..6.2,
+    ) {
+        let bending_nm2 = gauge(20).bending_stiffness_nm2();
+        let bore = Guide { length_m: 0.05, play_m };
+        let shear_n = 3.0 * bending_nm2 / (0.05 * 0.05);
+        let bore = Bore::new(&bore, bending_nm2);
+        let (slope, force_n) = (by_lean.0 * bore.lean, by_lean.1 * bore.lean * shear_n);
+        // Of the entry, of the exit and of both: positive definite.
+        let (entry, exit, both) = stiffness;
+        let (of_entry, of_exit) = (entry * shear_n / 0.05, exit * shear_n / 0.05);
+        let of_both = both * f64::sqrt(of_entry * of_exit);
+        let slope_by_exit = (of_both + of_entry) / shear_n;
+        let by = Held {
+            slope_by_exit,
+            slope_by_moment: (1.0 - entry) / bore.rotation_nm,
+            force_by_exit: of_exit + 2.0 * shear_n * slope_by_exit - of_entry,
+        };
+        let [exit_m, moment_nm] = bore.seat_along([slope, force_n], &by);
+        let along = Vector2::new(libm::cos(angle), libm::sin(angle));
+        let seat = bore.seat(&Answer { slope: along * slope, force_n: along * force_n, by });
+        prop_assert!((seat.exit_m - along * exit_m).norm() < 1e-6 * play_m, "{} {}", seat.exit_m, exit_m);
+        let moment = bore.rotation_nm * bore.lean;
+        prop_assert!((seat.moment_nm - along * moment_nm).norm() < 1e-6 * moment, "{} {}", seat.moment_nm, moment_nm);
     }
 
     #[test]
