@@ -9,8 +9,8 @@ pub(crate) type Symmetric = [f64; 3];
 /// An element by where its second node is, u, and how far it is bent, e: beyond p, where its first node would take that
 /// one if it were rigid.
 ///
-/// Its energy is `u' rest u / 2 - u' mixed e + e' bend e / 2`. In short elements `bend` is larger than all else by orders
-/// of magnitude, which would cancel in the displacements of both nodes: by 1e-4 of a tip's place.
+/// Its energy is `u' rest u / 2 - u' mixed e + e' bend e / 2`. In short elements `bend` is larger than all else by
+/// orders of magnitude, which would cancel in the displacements of both nodes: by 1e-4 of a tip's place.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Element {
     pub length_m: f64,

@@ -72,6 +72,37 @@ pub(crate) struct Bore {
     pub lean: f64,
 }
 
+/// Where a needle rests in a bore, along a line.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rest {
+    /// Where the exit's wall is that the entry's wall presses it to, 1 or -1.
+    pub side: f64,
+    /// Displacement at the exit, m.
+    pub exit_m: f64,
+    /// Moment at the exit, beside that of the spring of two supports, N m.
+    pub moment_nm: f64,
+}
+
+impl Rest {
+    /// In the middle, free.
+    pub const MIDDLE: Self = Self {
+        side: 1.0,
+        exit_m: 0.0,
+        moment_nm: 0.0,
+    };
+}
+
+/// How a needle lies in a bore, if it is pressed to one wall at the exit and to the other one at the entry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Leaning {
+    /// It leaves the wall at the entry.
+    OnEnds,
+    /// It lies on the wall from the entry on (see [`Bore::seat`]).
+    OnWall,
+    /// It is not pressed there.
+    Elsewhere,
+}
+
 impl Bore {
     /// Of a guide, and the needle's bending stiffness, N m2.
     pub fn new(guide: &Guide, bending_nm2: f64) -> Self {
@@ -87,16 +118,26 @@ impl Bore {
         }
     }
 
-    /// Displacement, m, and moment, N m, at the exit of a needle that is pressed to the wall on one side (1 or -1) at the
-    /// exit and on the other one at the entry.
-    pub fn leaning(&self, side: f64) -> [f64; 2] {
-        [self.play_m * side, self.lean * self.rotation_nm * side]
+    /// A needle that is pressed to the wall on one side (1 or -1) at the exit and on the other one at the entry.
+    pub fn leaning(&self, side: f64) -> Rest {
+        Rest {
+            side,
+            exit_m: self.play_m * side,
+            moment_nm: self.lean * self.rotation_nm * side,
+        }
     }
 
-    /// Whether it is pressed there, by slope and force at the exit, and leaves the wall at the entry (see [`Self::seat`]).
-    pub fn leans(&self, side: f64, [slope, force_n]: [f64; 2]) -> bool {
+    /// How it lies there, by slope and force at the exit: nowhere else if it is not pressed to both walls.
+    #[inline(always)]
+    pub fn leans(&self, side: f64, [slope, force_n]: [f64; 2]) -> Leaning {
         let off = slope * side - self.lean;
-        off >= 0.0 && off <= 2.0 * self.lean && force_n * side <= off * self.shear_n
+        if off < 0.0 || force_n * side > off * self.shear_n {
+            Leaning::Elsewhere
+        } else if off <= 2.0 * self.lean {
+            Leaning::OnEnds
+        } else {
+            Leaning::OnWall
+        }
     }
 
     /// Where the needle comes to rest in the bore.
@@ -159,7 +200,7 @@ impl Bore {
         let is_there = play_m > 0.0 && away.norm() > 1.0 - 1e-9;
         if is_there && slope.dot(&away) > 3.0 * chord.dot(&away) {
             let along = [answer.slope, answer.force_n].map(|each| each.dot(&away));
-            let on_wall = self.on_wall(along, &answer.by);
+            let on_wall = self.on_wall(along, &answer.by, 0.0);
             exit_m += away * (on_wall.exit_m - exit_m.dot(&away));
             moment_nm += away * (on_wall.moment_nm - moment_nm.dot(&away));
             slope += away * (on_wall.slope - slope.dot(&away));
@@ -171,9 +212,10 @@ impl Bore {
         }
     }
 
-    /// [`Self::seat`] of a needle that is bent along one line, by slope and force there: displacement, m, and moment, N m, at
-    /// the exit. The balance of both ends has a closed form then.
-    pub fn seat_along(&self, [slope, force_n]: [f64; 2], by: &Held) -> [f64; 2] {
+    /// [`Self::seat`] of a needle that is bent along one line, by slope and force there, and where it rested before.
+    /// The balance of both ends has a closed form then.
+    #[inline(always)]
+    pub fn seat_along(&self, [slope, force_n]: [f64; 2], by: &Held, before: &Rest) -> Rest {
         let Self {
             length_m,
             play_m,
@@ -182,7 +224,11 @@ impl Bore {
             ..
         } = *self;
         if slope == 0.0 {
-            return [0.0; 2];
+            return Rest {
+                exit_m: 0.0,
+                moment_nm: 0.0,
+                ..*before
+            };
         }
         // Energy's derivatives by the displacement at the entry and at the exit: `pull` without any.
         let of_entry = shear * (1.0 - by.slope_by_moment * rotation_nm) / length_m;
@@ -213,67 +259,95 @@ impl Bore {
         let side = 1.0_f64.copysign(-entry_m);
         let bent = slope + by.slope_by_exit * exit_m + by.slope_by_moment * moment_nm;
         if entry_m.abs() < play_m || bent * side <= 3.0 * chord * side {
-            return [exit_m, moment_nm];
-        }
-        let found = self.on_wall([slope * side, force_n * side], by);
-        [found.exit_m, found.moment_nm].map(|each| each * side)
-    }
-
-    /// A needle that lies on the wall from the entry on, with its exit on the other wall or before it; slope and force along
-    /// the direction away from that wall.
-    fn on_wall(&self, [slope, force_n]: [f64; 2], by: &Held) -> OnWall {
-        let Self {
-            play_m,
-            bending_nm2,
-            rotation_nm,
-            ..
-        } = *self;
-        // With the exit at a displacement: what it is then, and what has to hold it.
-        let at = |exit_m: f64| {
-            let off_m = exit_m + play_m;
-            // slope = bare + by_moment (rotation slope - 2 EI slope^2 / (3 off))
-            let bare = (slope + by.slope_by_exit * exit_m).max(0.0);
-            let bend = bending_nm2 / (1.5 * off_m);
-            let b = 1.0 - by.slope_by_moment * rotation_nm;
-            let root = (b * b + 4.0 * by.slope_by_moment * bend * bare).sqrt();
-            let slope = 2.0 * bare / (b + root);
-            let wall_nm = bend * slope * slope;
-            let moment_nm = rotation_nm * slope - wall_nm;
-            let held_n = force_n + by.force_by_exit * exit_m
-                - by.slope_by_exit * moment_nm
-                - wall_nm * slope / (3.0 * off_m);
-            let found = OnWall {
+            return Rest {
+                side,
                 exit_m,
                 moment_nm,
-                slope,
             };
-            (found, held_n)
-        };
-        let (mut found, mut held_n) = at(play_m);
+        }
+        self.lying(side, [slope, force_n], by, before)
+    }
+
+    /// The same of a needle that lies on the wall from the entry on, away from which is `side`.
+    #[inline(always)]
+    pub fn lying(&self, side: f64, [slope, force_n]: [f64; 2], by: &Held, before: &Rest) -> Rest {
+        let OnWall {
+            exit_m, moment_nm, ..
+        } = self.on_wall([slope * side, force_n * side], by, before.exit_m * side);
+        Rest {
+            side,
+            exit_m: exit_m * side,
+            moment_nm: moment_nm * side,
+        }
+    }
+
+    /// A needle that lies on the wall from the entry on, with its exit on the other wall or before it, where it is looked
+    /// for from `start_m` on; slope and force along the direction away from the first wall.
+    #[inline(always)]
+    fn on_wall(&self, along: [f64; 2], by: &Held, start_m: f64) -> OnWall {
+        let (found, held_n, _) = self.lifted(self.play_m, along, by);
         if held_n <= 0.0 {
-            return found;
+            found
+        } else {
+            self.before_wall(along, by, start_m)
         }
-        // The wall at the exit would have to pull: by secants, or halves where they lead out.
-        let (mut low_m, mut high_m) = (-play_m, play_m);
-        let mut next_m = 0.0;
-        for _ in 0..STEPS {
-            let before = (found.exit_m, held_n);
-            (found, held_n) = at(next_m);
+    }
+
+    /// The same where the wall at the exit would have to pull: by Newton's method, or halves where that leads out.
+    #[inline(never)]
+    fn before_wall(&self, along: [f64; 2], by: &Held, start_m: f64) -> OnWall {
+        let (mut low_m, mut high_m) = (-self.play_m, self.play_m);
+        let mut exit_m = if start_m.abs() < self.play_m {
+            start_m
+        } else {
+            0.0
+        };
+        let mut number = 0;
+        loop {
+            let (found, held_n, by_exit) = self.lifted(exit_m, along, by);
             if held_n > 0.0 {
-                high_m = next_m;
+                high_m = exit_m;
             } else {
-                low_m = next_m;
+                low_m = exit_m;
             }
-            let change_m = held_n * (next_m - before.0) / (held_n - before.1);
-            if change_m.is_nan() || change_m.abs() <= EXIT * play_m {
-                break;
+            let change_m = -held_n / by_exit;
+            number += 1;
+            if change_m.abs() <= EXIT * self.play_m || number == STEPS {
+                return found;
             }
-            next_m -= change_m;
-            if next_m <= low_m || next_m >= high_m {
-                next_m = 0.5 * (low_m + high_m);
+            exit_m += change_m;
+            if !(low_m..=high_m).contains(&exit_m) {
+                exit_m = 0.5 * (low_m + high_m);
             }
         }
-        found
+    }
+
+    /// A needle that lies on the wall from the entry on, with its exit at a displacement: what has to hold it there, N,
+    /// and how that grows with the displacement, N/m.
+    #[inline(always)]
+    fn lifted(&self, exit_m: f64, [slope, force_n]: [f64; 2], by: &Held) -> (OnWall, f64, f64) {
+        let by_off = 1.0 / (exit_m + self.play_m);
+        // slope = bare + by_moment (rotation slope - 2 EI slope^2 / (3 off))
+        let bare = (slope + by.slope_by_exit * exit_m).max(0.0);
+        let bend = self.bending_nm2 * by_off / 1.5;
+        let b = 1.0 - by.slope_by_moment * self.rotation_nm;
+        let root = (b * b + 4.0 * by.slope_by_moment * bend * bare).sqrt();
+        let slope = 2.0 * bare / (b + root);
+        let wall_nm = bend * slope * slope;
+        let moment_nm = self.rotation_nm * slope - wall_nm;
+        let lift_n = wall_nm * slope * by_off / 3.0;
+        let held_n = force_n + by.force_by_exit * exit_m - by.slope_by_exit * moment_nm - lift_n;
+        // The same by the displacement.
+        let turn = (by.slope_by_exit + by.slope_by_moment * wall_nm * by_off) / root;
+        let wall = bend * slope * (2.0 * turn - slope * by_off);
+        let lift = bend * slope * slope * by_off * (turn - slope * by_off * (2.0 / 3.0));
+        let by_exit = by.force_by_exit - by.slope_by_exit * (self.rotation_nm * turn - wall) - lift;
+        let found = OnWall {
+            exit_m,
+            moment_nm,
+            slope,
+        };
+        (found, held_n, by_exit)
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 
 use crate::element::{Element, Pair};
 use crate::elimination::{Load, Open, Reached, Tip};
-use crate::guide::{Answer, Bore, Guide, Held, Holder, Seat};
+use crate::guide::{Answer, Bore, Guide, Held, Holder, Leaning, Rest, Seat};
 use crate::layers::{Impulse, Layers};
 use crate::needle::{Needle, NeedleError};
 
@@ -352,10 +352,10 @@ impl<'c> Case<'c> {
         }
         let before = self.reached(0.0);
         let mut known = before;
-        let mut side = 1.0;
+        let mut rest = Rest::MIDDLE;
         self.elements(|element, depth_m| {
             let open = self.behind(known.as_ref(), element, [path_m]);
-            (path_m, side) = self.tip_m(&open, force_n(depth_m), side);
+            (path_m, rest) = self.tip_m(&open, force_n(depth_m), &rest);
             known = Some(open.closed([path_m]));
             seen(path_m);
         });
@@ -376,7 +376,7 @@ impl<'c> Case<'c> {
             }
             let open = self.behind(known.as_ref(), element, [path_m]);
             let from_m = path_m;
-            path_m = self.tip_m(&open, force_n(depth_m), 0.0).0;
+            path_m = self.tip_m(&open, force_n(depth_m), &Rest::MIDDLE).0;
             passed.push((*element, [from_m, path_m]));
             seen(path_m);
         });
@@ -389,30 +389,33 @@ impl<'c> Case<'c> {
         path
     }
 
-    /// Where the tip is, m, and on which side of the guide's exit the needle lies, which it is first assumed to do on `side`.
+    /// Where the tip is, m, and where the needle rests in its guide; it is tried first whether it does as before.
     #[inline(always)]
-    fn tip_m(&self, open: &Open<1>, force_n: f64, side: f64) -> (f64, f64) {
+    fn tip_m(&self, open: &Open<1>, force_n: f64, rest: &Rest) -> (f64, Rest) {
         let tip = Tip::new(open);
         let load = open.loads[0].pushed(force_n);
         let Some(bore) = self.bore.as_ref().filter(|bore| bore.play_m > 0.0) else {
-            return (tip.answer(&load, [0.0; 2]).0, side);
+            return (tip.answer(&load, [0.0; 2]).0, *rest);
         };
-        let (tip_m, at_exit) = tip.answer(&load, bore.leaning(side));
-        if bore.leans(side, at_exit) {
-            return (tip_m, side);
+        let on_ends = bore.leaning(rest.side);
+        let (tip_m, at_exit) = tip.answer(&load, [on_ends.exit_m, on_ends.moment_nm]);
+        let leaning = bore.leans(rest.side, at_exit);
+        if leaning == Leaning::OnEnds {
+            return (tip_m, on_ends);
         }
-        Self::seated_tip_m(*bore, tip, load)
-    }
-
-    /// The same wherever it comes to rest in the bore.
-    #[inline(never)]
-    fn seated_tip_m(bore: Bore, tip: Tip, load: Load) -> (f64, f64) {
         let (tip_m, by_load) = tip.answer(&load, [0.0; 2]);
         let [(tip_by_exit, by_exit), (tip_by_moment, by_moment)] =
             [[1.0, 0.0], [0.0, 1.0]].map(|exit| tip.answer(&Load::default(), exit));
-        let [exit_m, moment_nm] = bore.seat_along(by_load, &held(by_exit, by_moment));
-        let tip_m = tip_m + tip_by_exit * exit_m + tip_by_moment * moment_nm;
-        (tip_m, 1.0_f64.copysign(exit_m))
+        let by = held(by_exit, by_moment);
+        let rest = if leaning == Leaning::OnWall {
+            bore.lying(rest.side, by_load, &by, rest)
+        } else {
+            bore.seat_along(by_load, &by, rest)
+        };
+        (
+            tip_m + tip_by_exit * rest.exit_m + tip_by_moment * rest.moment_nm,
+            rest,
+        )
     }
 
     /// The needle at the end of its way, on a path; with what has moved since.
