@@ -16,7 +16,7 @@ pub(crate) struct Element {
     pub length_m: f64,
     /// Stiffness of the beam, and of the foundation.
     pub bend: Symmetric,
-    /// Of the foundation, row by row.
+    /// Of the foundation, column by column.
     pub mixed: [Pair; 2],
     /// Of the foundation, where nothing bends.
     pub rest: Symmetric,
@@ -53,8 +53,8 @@ impl Element {
                 (4.0 * beam + 116.0 * part) * (h * h),
             ],
             mixed: [
-                [210.0 * part, -175.0 * part * h],
-                [-147.0 * part * h, 126.0 * part * (h * h)],
+                [210.0 * part, -147.0 * part * h],
+                [-175.0 * part * h, 126.0 * part * (h * h)],
             ],
             rest: [420.0 * part, -210.0 * part * h, 140.0 * part * (h * h)],
             by_path: [

@@ -1,11 +1,6 @@
 //! The needle from its holder to a node, put together into what the next element feels.
 
 use crate::element::{Element, Pair, Symmetric};
-use crate::guide::Held;
-
-/// What a displacement of 1 m at the exit and a moment of 1 N m there do.
-const EXIT: usize = 0;
-const MOMENT: usize = 1;
 
 /// What is before a node, without the loads of the path: `stiffness * u = right`.
 ///
@@ -13,19 +8,18 @@ const MOMENT: usize = 1;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Elimination {
     pub stiffness: Symmetric,
-    /// Right sides by displacement and by moment at the exit, force and moment of both. The slope at the exit by u is
-    /// `moment . u`, and the force that holds it `-exit . u` (Maxwell and Betti).
+    /// By the node's displacement, and by its slope: the force that holds the exit, and the slope there. The same are what a
+    /// displacement at the exit, reversed, and a moment there load the node with (Maxwell and Betti).
     columns: [Pair; 2],
-    /// At the exit, with the node held.
-    held: Held,
+    /// By a displacement of 1 m and by a moment of 1 N m at the exit: force and slope there, with the node held.
+    held: [Pair; 2],
 }
 
-/// What the path and the tip load a node with, in one plane, and slope and force at the exit with the node held.
+/// What the path and the tip load a node with, in one plane, and force and slope at the exit with the node held.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Load {
     pub right: Pair,
-    pub slope: f64,
-    pub force_n: f64,
+    pub exit: Pair,
 }
 
 /// What is before a node, with loads in some planes.
@@ -47,14 +41,26 @@ pub(crate) struct Open<const PLANES: usize> {
 /// A further element, eliminated.
 struct Passed {
     after: Elimination,
-    /// How the second node is loaded by what loads the first one.
+    /// How force and moment on the first node load the second one less than if the element were rigid.
     through: [Pair; 2],
-    /// What that does at the exit.
+    /// What they do at the exit.
     columns: [Pair; 2],
 }
 
-fn dot(a: Pair, b: Pair) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
+/// Columns by what they are of.
+#[inline(always)]
+fn sum(columns: [Pair; 2], of: Pair) -> Pair {
+    [0, 1].map(|at| columns[0][at] * of[0] + columns[1][at] * of[1])
+}
+
+#[inline(always)]
+fn plus(a: Pair, b: Pair) -> Pair {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+#[inline(always)]
+fn less(a: Pair, b: Pair) -> Pair {
+    [a[0] - b[0], a[1] - b[1]]
 }
 
 /// The inverse, and what it is to be multiplied by.
@@ -81,7 +87,7 @@ impl Elimination {
     fn first(element: &Element, rotation_nm: Option<f64>) -> (Self, [Load; 2]) {
         let Element {
             bend: [b11, b12, b22],
-            mixed: [[m11, m12], [m21, m22]],
+            mixed: [[m11, m21], [m12, m22]],
             rest,
             length_m: h,
             ..
@@ -105,8 +111,10 @@ impl Elimination {
             let turned = h * loads.first[0] + loads.first[1];
             Load {
                 right: [0, 1].map(|at| loads.whole[at] - loads.first[at] + by_moment[at] * turned),
-                slope: flexible * turned,
-                force_n: coupling * flexible * turned - loads.first[0],
+                exit: [
+                    coupling * flexible * turned - loads.first[0],
+                    flexible * turned,
+                ],
             }
         });
         let before = Self {
@@ -115,12 +123,11 @@ impl Elimination {
                 own[1] - across[0] * by_moment[1],
                 own[2] - across[1] * by_moment[1],
             ],
-            columns: [[by_exit[0], by_moment[0]], [by_exit[1], by_moment[1]]],
-            held: Held {
-                slope_by_exit: -flexible * coupling,
-                slope_by_moment: flexible,
-                force_by_exit: b11 - coupling * coupling * flexible,
-            },
+            columns: [[-by_exit[0], by_moment[0]], [-by_exit[1], by_moment[1]]],
+            held: [
+                [b11 - coupling * coupling * flexible, -flexible * coupling],
+                [flexible * coupling, flexible],
+            ],
         };
         (before, loads)
     }
@@ -138,65 +145,48 @@ impl Elimination {
         // One step waits for the other by the stiffness alone: its products are made beside the division.
         let ([a, b, c], scale) = adjoint([0, 1, 2].map(|at| s[at] + element.bend[at]));
         let bend = [a * scale, b * scale, c * scale];
-        let [[m11, m12], [m21, m22]] = element.mixed;
-        let near = [[s[0] + m11, s[1] + m12], [s[1] + m21, s[2] + m22]];
-        let products = near.map(|row| times([a, b, c], row));
-        let through = products.map(|row| row.map(|each| each * scale));
+        let near = [[s[0], s[1]], [s[1], s[2]]];
+        let near = [0, 1].map(|of| plus(near[of], element.mixed[of]));
+        let products = [[a, b], [b, c]].map(|row| sum(near, row));
+        let through = products.map(|column| column.map(|each| each * scale));
         let [force, moment] = self.columns;
         let moment = [0, 1].map(|of| moment[of] - element.length_m * force[of]);
-        let bent = [
-            [0, 1].map(|of| bend[0] * force[of] + bend[1] * moment[of]),
-            [0, 1].map(|of| bend[1] * force[of] + bend[2] * moment[of]),
-        ];
-        let by = |of: usize, by: usize| bent[0][of] * force[by] + bent[1][of] * moment[by];
-        let rest = |row: [f64; 2], of: usize| {
-            [0, 1].map(|at| [force, moment][of][at] - (row[0] * force[at] + row[1] * moment[at]))
-        };
+        let moved = [force, moment];
+        let columns = [[bend[0], bend[1]], [bend[1], bend[2]]].map(|row| sum(moved, row));
+        let [by_exit, by_moment] = [0, 1].map(|of| sum(columns, [force[of], moment[of]]));
+        let whole = [s[0] + element.rest[0], s[1] + element.rest[1]];
+        let bent = sum(near, [products[0][0], products[1][0]]);
+        let turned = products[0][1] * near[0][1] + products[1][1] * near[1][1];
         let after = Self {
             stiffness: [
-                s[0] + element.rest[0] - dot(products[0], near[0]) * scale,
-                s[1] + element.rest[1] - dot(products[0], near[1]) * scale,
-                s[2] + element.rest[2] - dot(products[1], near[1]) * scale,
+                whole[0] - bent[0] * scale,
+                whole[1] - bent[1] * scale,
+                s[2] + element.rest[2] - turned * scale,
             ],
-            columns: [rest(through[0], 0), rest(through[1], 1)],
-            held: Held {
-                slope_by_exit: self.held.slope_by_exit + by(MOMENT, EXIT),
-                slope_by_moment: self.held.slope_by_moment + by(MOMENT, MOMENT),
-                force_by_exit: self.held.force_by_exit - by(EXIT, EXIT),
-            },
+            columns: [0, 1].map(|at| less(moved[at], sum(moved, [through[0][at], through[1][at]]))),
+            held: [less(self.held[0], by_exit), plus(self.held[1], by_moment)],
         };
         Passed {
             after,
             through,
-            columns: bent,
+            columns,
         }
     }
 
     /// With a displacement and a moment at the exit beside a load.
     #[inline(always)]
     pub fn seated(&self, load: &Load, [exit_m, moment_nm]: Pair) -> Load {
-        let Held {
-            slope_by_exit,
-            slope_by_moment,
-            force_by_exit,
-        } = self.held;
-        let by = |column: Pair| column[EXIT] * exit_m + column[MOMENT] * moment_nm;
+        let by = |column: Pair| column[1] * moment_nm - column[0] * exit_m;
         Load {
-            right: [0, 1].map(|at| load.right[at] + by(self.columns[at])),
-            slope: load.slope + slope_by_exit * exit_m + slope_by_moment * moment_nm,
-            force_n: load.force_n + force_by_exit * exit_m - slope_by_exit * moment_nm,
+            right: plus(load.right, self.columns.map(by)),
+            exit: plus(load.exit, sum(self.held, [exit_m, moment_nm])),
         }
     }
 
-    /// Slope and force at the exit with the node somewhere.
+    /// Force and slope at the exit with the node somewhere.
     #[inline(always)]
     pub fn at_exit(&self, load: &Load, u: Pair) -> Pair {
-        let [by_exit, by_moment] =
-            [EXIT, MOMENT].map(|of| [self.columns[0][of], self.columns[1][of]]);
-        [
-            load.slope + dot(by_moment, u),
-            load.force_n - dot(by_exit, u),
-        ]
+        plus(load.exit, sum(self.columns, u))
     }
 
     /// Where the node is under a load.
@@ -208,14 +198,11 @@ impl Elimination {
     pub fn back(&self, element: &Element, right: Pair, path: [f64; 2], behind: Pair) -> Pair {
         let s = self.moved(element);
         let bend = inverse([0, 1, 2].map(|at| s[at] + element.bend[at]));
-        let [[m11, m12], [m21, m22]] = element.mixed;
-        let near = [[s[0] + m11, s[1] + m21], [s[1] + m12, s[2] + m22]];
+        let near = [[s[0], s[1]], [s[1], s[2]]];
+        let near = [0, 1].map(|of| plus(near[of], element.mixed[of]));
         let right = moved(right, element.length_m);
-        let [first, second] = element.by_path;
-        let pull = [0, 1].map(|at| {
-            dot(near[at], behind)
-                - (right[at] + first.first[at] * path[0] + second.first[at] * path[1])
-        });
+        let load = plus(right, sum(element.by_path.map(|loads| loads.first), path));
+        let pull = [0, 1].map(|at| near[at][0] * behind[0] + near[at][1] * behind[1] - load[at]);
         let bent = times(bend, pull);
         let [place, slope] = [0, 1].map(|at| behind[at] - bent[at]);
         [place - element.length_m * slope, slope]
@@ -281,11 +268,9 @@ impl Passed {
 
     #[inline(always)]
     fn through(&self, whole: Pair, first: Pair, before: &Load) -> Load {
-        let at_exit = |of: usize| self.columns[0][of] * first[0] + self.columns[1][of] * first[1];
         Load {
-            right: [0, 1].map(|at| whole[at] - dot(self.through[at], first)),
-            slope: before.slope + at_exit(MOMENT),
-            force_n: before.force_n - at_exit(EXIT),
+            right: less(whole, sum(self.through, first)),
+            exit: plus(before.exit, sum(self.columns, first)),
         }
     }
 }
@@ -294,8 +279,7 @@ impl Load {
     fn closed(&self, by_path: &Self, path_m: f64) -> Self {
         Self {
             right: [0, 1].map(|at| self.right[at] + by_path.right[at] * path_m),
-            slope: self.slope + by_path.slope * path_m,
-            force_n: self.force_n + by_path.force_n * path_m,
+            exit: [0, 1].map(|at| self.exit[at] + by_path.exit[at] * path_m),
         }
     }
 
@@ -334,7 +318,7 @@ impl Tip {
         }
     }
 
-    /// Displacement of the tip, m, and slope and force at the exit, under a load and with a displacement, m, and a
+    /// Displacement of the tip, m, and force and slope at the exit, under a load and with a displacement, m, and a
     /// moment, N m, at the exit.
     #[inline(always)]
     pub fn answer(&self, load: &Load, exit: Pair) -> (f64, Pair) {

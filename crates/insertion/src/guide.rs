@@ -127,9 +127,9 @@ impl Bore {
         }
     }
 
-    /// How it lies there, by slope and force at the exit: nowhere else if it is not pressed to both walls.
+    /// How it lies there, by force and slope at the exit: nowhere else if it is not pressed to both walls.
     #[inline(always)]
-    pub fn leans(&self, side: f64, [slope, force_n]: [f64; 2]) -> Leaning {
+    pub fn leans(&self, side: f64, [force_n, slope]: [f64; 2]) -> Leaning {
         let off = slope * side - self.lean;
         if off < 0.0 || force_n * side > off * self.shear_n {
             Leaning::Elsewhere
@@ -199,7 +199,7 @@ impl Bore {
         let away = entry_m * (-1.0 / play_m);
         let is_there = play_m > 0.0 && away.norm() > 1.0 - 1e-9;
         if is_there && slope.dot(&away) > 3.0 * chord.dot(&away) {
-            let along = [answer.slope, answer.force_n].map(|each| each.dot(&away));
+            let along = [answer.force_n, answer.slope].map(|each| each.dot(&away));
             let on_wall = self.on_wall(along, &answer.by, 0.0);
             exit_m += away * (on_wall.exit_m - exit_m.dot(&away));
             moment_nm += away * (on_wall.moment_nm - moment_nm.dot(&away));
@@ -212,10 +212,10 @@ impl Bore {
         }
     }
 
-    /// [`Self::seat`] of a needle that is bent along one line, by slope and force there, and where it rested before.
+    /// [`Self::seat`] of a needle that is bent along one line, by force and slope there, and where it rested before.
     /// The balance of both ends has a closed form then.
     #[inline(always)]
-    pub fn seat_along(&self, [slope, force_n]: [f64; 2], by: &Held, before: &Rest) -> Rest {
+    pub fn seat_along(&self, [force_n, slope]: [f64; 2], by: &Held, before: &Rest) -> Rest {
         let Self {
             length_m,
             play_m,
@@ -265,15 +265,15 @@ impl Bore {
                 moment_nm,
             };
         }
-        self.lying(side, [slope, force_n], by, before)
+        self.lying(side, [force_n, slope], by, before)
     }
 
     /// The same of a needle that lies on the wall from the entry on, away from which is `side`.
     #[inline(always)]
-    pub fn lying(&self, side: f64, [slope, force_n]: [f64; 2], by: &Held, before: &Rest) -> Rest {
+    pub fn lying(&self, side: f64, [force_n, slope]: [f64; 2], by: &Held, before: &Rest) -> Rest {
         let OnWall {
             exit_m, moment_nm, ..
-        } = self.on_wall([slope * side, force_n * side], by, before.exit_m * side);
+        } = self.on_wall([force_n * side, slope * side], by, before.exit_m * side);
         Rest {
             side,
             exit_m: exit_m * side,
@@ -282,7 +282,7 @@ impl Bore {
     }
 
     /// A needle that lies on the wall from the entry on, with its exit on the other wall or before it, where it is looked
-    /// for from `start_m` on; slope and force along the direction away from the first wall.
+    /// for from `start_m` on; force and slope along the direction away from the first wall.
     #[inline(always)]
     fn on_wall(&self, along: [f64; 2], by: &Held, start_m: f64) -> OnWall {
         let (found, held_n, _) = self.lifted(self.play_m, along, by);
@@ -325,7 +325,7 @@ impl Bore {
     /// A needle that lies on the wall from the entry on, with its exit at a displacement: what has to hold it there, N,
     /// and how that grows with the displacement, N/m.
     #[inline(always)]
-    fn lifted(&self, exit_m: f64, [slope, force_n]: [f64; 2], by: &Held) -> (OnWall, f64, f64) {
+    fn lifted(&self, exit_m: f64, [force_n, slope]: [f64; 2], by: &Held) -> (OnWall, f64, f64) {
         let by_off = 1.0 / (exit_m + self.play_m);
         // slope = bare + by_moment (rotation slope - 2 EI slope^2 / (3 off))
         let bare = (slope + by.slope_by_exit * exit_m).max(0.0);

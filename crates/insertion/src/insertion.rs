@@ -454,8 +454,8 @@ impl<'c> Case<'c> {
             [[1.0, 0.0], [0.0, 1.0]].map(|exit| at_exit(&before.seated(&Load::default(), exit)));
         let [y, z] = loads.map(|load| at_exit(&load));
         let seat = self.seat(&Answer {
-            slope: Vector2::new(y[0], z[0]),
-            force_n: Vector2::new(y[1], z[1]),
+            slope: Vector2::new(y[1], z[1]),
+            force_n: Vector2::new(y[0], z[0]),
             by: held(by_exit, by_moment),
         });
         let mut shape = vec![[0.0; 2]; path.len()];
@@ -499,11 +499,11 @@ impl<'c> Case<'c> {
     }
 }
 
-/// By slope and force at the exit, of a displacement and of a moment there.
+/// By force and slope at the exit, of a displacement and of a moment there.
 fn held(by_exit: Pair, by_moment: Pair) -> Held {
     Held {
-        slope_by_exit: by_exit[0],
-        slope_by_moment: by_moment[0],
-        force_by_exit: by_exit[1],
+        slope_by_exit: by_exit[1],
+        slope_by_moment: by_moment[1],
+        force_by_exit: by_exit[0],
     }
 }

@@ -395,7 +395,7 @@ proptest! {
             slope_by_moment: (1.0 - entry) / bore.rotation_nm,
             force_by_exit: of_exit + 2.0 * shear_n * slope_by_exit - of_entry,
         };
-        let Rest { exit_m, moment_nm, .. } = bore.seat_along([slope, force_n], &by, &Rest::MIDDLE);
+        let Rest { exit_m, moment_nm, .. } = bore.seat_along([force_n, slope], &by, &Rest::MIDDLE);
         let along = Vector2::new(libm::cos(angle), libm::sin(angle));
         let seat = bore.seat(&Answer { slope: along * slope, force_n: along * force_n, by });
         prop_assert!((seat.exit_m - along * exit_m).norm() < 1e-6 * play_m, "{} {}", seat.exit_m, exit_m);
