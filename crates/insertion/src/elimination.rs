@@ -8,8 +8,8 @@ use crate::element::{Element, Pair, Symmetric};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Elimination {
     pub stiffness: Symmetric,
-    /// By the node's displacement, and by its slope: the force that holds the exit, and the slope there. The same are what a
-    /// displacement at the exit, reversed, and a moment there load the node with (Maxwell and Betti).
+    /// By the node's displacement, and by its slope: the force that holds the exit, and the slope there. The same are
+    /// what a displacement at the exit, reversed, and a moment there load the node with (Maxwell and Betti).
     columns: [Pair; 2],
     /// By a displacement of 1 m and by a moment of 1 N m at the exit: force and slope there, with the node held.
     held: [Pair; 2],
@@ -297,7 +297,8 @@ impl Load {
 pub(crate) struct Tip {
     before: Elimination,
     by_path: Load,
-    scale: f64,
+    /// Its displacement by force and moment.
+    place: Pair,
     by_moment: f64,
 }
 
@@ -310,23 +311,29 @@ impl Tip {
         let [a, b, c] = before.stiffness;
         // The path at the tip is the tip's own displacement.
         let [force, moment] = by_path.right;
+        let scale = 1.0 / ((a - force) * c - (b - moment) * b);
         Self {
             before,
             by_path,
-            scale: 1.0 / ((a - force) * c - (b - moment) * b),
+            place: [c * scale, -b * scale],
             by_moment: 1.0 / c,
         }
     }
 
-    /// Displacement of the tip, m, and force and slope at the exit, under a load and with a displacement, m, and a
-    /// moment, N m, at the exit.
+    /// Displacement of the tip, m, and force and slope at the exit, under a load, a force across the tip, N, and a
+    /// displacement, m, and a moment, N m, at the exit.
     #[inline(always)]
-    pub fn answer(&self, load: &Load, exit: Pair) -> (f64, Pair) {
-        let load = self.before.seated(load, exit);
-        let [_, b, c] = self.before.stiffness;
-        let [force, moment] = load.right;
-        let tip_m = (c * force - b * moment) * self.scale;
+    pub fn answer(&self, load: &Load, force_n: f64, exit: Pair) -> (f64, Pair) {
+        let without = Load::default().pushed(force_n);
+        let acting = self.before.seated(&without, exit);
+        let [force, moment] = plus(load.right, acting.right);
+        let tip_m = self.place[0] * force + self.place[1] * moment;
+        let [_, b, _] = self.before.stiffness;
         let slope = (moment + (self.by_path.right[1] - b) * tip_m) * self.by_moment;
+        let load = Load {
+            right: [force, moment],
+            exit: plus(load.exit, acting.exit),
+        };
         let load = load.closed(&self.by_path, tip_m);
         (tip_m, self.before.at_exit(&load, [tip_m, slope]))
     }

@@ -332,7 +332,11 @@ impl Bore {
         let bend = self.bending_nm2 * by_off / 1.5;
         let b = 1.0 - by.slope_by_moment * self.rotation_nm;
         let root = (b * b + 4.0 * by.slope_by_moment * bend * bare).sqrt();
-        let slope = 2.0 * bare / (b + root);
+        let slope = if bare > 0.0 {
+            2.0 * bare / (b + root)
+        } else {
+            0.0
+        };
         let wall_nm = bend * slope * slope;
         let moment_nm = self.rotation_nm * slope - wall_nm;
         let lift_n = wall_nm * slope * by_off / 3.0;

@@ -13,7 +13,8 @@ const ELEMENT_M: f64 = 0.6e-3;
 
 /// The first element in tissue that is stiffer than what is before it, m, and by how much each one is longer than the one
 /// before it. A long overhang is softer than the first tenths of a millimetre of stiff tissue: what the tip does there
-/// decides how the needle goes on. Shorter ones round: by 20 um at 2e-6 m.
+/// decides how the needle goes on. From 2e-6 m on, tips of 40 random cases are elsewhere by 5e-5 of their place in the
+/// median, and by 1 % at worst.
 const FIRST_M: f64 = 4e-5;
 const GROWTH: f64 = 1.15;
 
@@ -104,7 +105,9 @@ pub enum InsertionError {
 
 /// Inserts a needle through all layers.
 ///
-/// Accuracy: see `tests/`: closed forms to 1e-6, the circle of a cut path to 1e-3.
+/// Accuracy: see `tests/`: closed forms to 1e-6, the circle of a cut path to 1e-3. Tips round by 3e-12 of their place in a
+/// guide without play, and by 5e-10 in one with play (against 50 decimal digits, 360 random cases); where the first layer
+/// has no force and the guide play, the needle may lean either way, and rounding decides.
 ///
 /// # Errors
 /// [`InsertionError`].
@@ -393,19 +396,19 @@ impl<'c> Case<'c> {
     #[inline(always)]
     fn tip_m(&self, open: &Open<1>, force_n: f64, rest: &Rest) -> (f64, Rest) {
         let tip = Tip::new(open);
-        let load = open.loads[0].pushed(force_n);
+        let load = &open.loads[0];
         let Some(bore) = self.bore.as_ref().filter(|bore| bore.play_m > 0.0) else {
-            return (tip.answer(&load, [0.0; 2]).0, *rest);
+            return (tip.answer(load, force_n, [0.0; 2]).0, *rest);
         };
         let on_ends = bore.leaning(rest.side);
-        let (tip_m, at_exit) = tip.answer(&load, [on_ends.exit_m, on_ends.moment_nm]);
+        let (tip_m, at_exit) = tip.answer(load, force_n, [on_ends.exit_m, on_ends.moment_nm]);
         let leaning = bore.leans(rest.side, at_exit);
         if leaning == Leaning::OnEnds {
             return (tip_m, on_ends);
         }
-        let (tip_m, by_load) = tip.answer(&load, [0.0; 2]);
+        let (tip_m, by_load) = tip.answer(load, force_n, [0.0; 2]);
         let [(tip_by_exit, by_exit), (tip_by_moment, by_moment)] =
-            [[1.0, 0.0], [0.0, 1.0]].map(|exit| tip.answer(&Load::default(), exit));
+            [[1.0, 0.0], [0.0, 1.0]].map(|exit| tip.answer(&Load::default(), 0.0, exit));
         let by = held(by_exit, by_moment);
         let rest = if leaning == Leaning::OnWall {
             bore.lying(rest.side, by_load, &by, rest)

@@ -258,6 +258,38 @@ fn another_programs_bends_are_met() {
     }
 }
 
+/// Where nothing bends a needle, whether it lies on the wall of its guide is a question of rounding.
+#[test]
+fn a_layer_without_force_is_passed() {
+    let needle = Needle {
+        young_pa: 209_728_022_065.727_17,
+        ..gauge(18)
+    };
+    let holder = Holder::Guide(Guide {
+        length_m: 0.099_507_862_943_235_85,
+        play_m: 7.418_968_678_028_867e-6,
+    });
+    let tissue = layers(&[
+        [0.005_040_923_998_929_266, 6_886.714_671_837_535, 0.0],
+        [
+            0.013_895_385_709_197_027,
+            835.807_414_302_428_5,
+            0.096_245_996_501_426_35,
+        ],
+    ]);
+    let steep = Bevel {
+        angle_rad: 0.958_923_777_928_847_1,
+        ..bevel(EAST)
+    };
+    let [_, [tip_m, _]] = ends(&needle, &holder, 0.0, &tissue, &steep).unwrap();
+    // Farther than by the play, and not as far as without tissue.
+    let (length_m, bore_m, force_n) = (tissue.depth_m(), 0.0995, 0.0963);
+    let in_air_m = force_n * length_m * length_m * (length_m + bore_m)
+        / (3.0 * needle.bending_stiffness_nm2())
+        + 7.42e-6 * (1.0 + 2.0 * length_m / bore_m);
+    assert!(tip_m > 7.42e-6 && tip_m < in_air_m, "{tip_m} {in_air_m}");
+}
+
 #[test]
 fn a_slip_of_nothing_changes_nothing() {
     let tissue = layers(&[[0.03, 2e4, 0.1], [0.05, 2e3, 0.025], [0.01, 2e4, 0.1]]);
