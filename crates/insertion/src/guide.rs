@@ -223,7 +223,7 @@ impl Bore {
             shear_n: shear,
             ..
         } = *self;
-        if slope == 0.0 {
+        if slope == 0.0 || play_m == 0.0 {
             return Rest {
                 exit_m: 0.0,
                 moment_nm: 0.0,

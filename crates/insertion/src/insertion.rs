@@ -456,11 +456,19 @@ impl<'c> Case<'c> {
         let [by_exit, by_moment] =
             [[1.0, 0.0], [0.0, 1.0]].map(|exit| at_exit(&before.seated(&Load::default(), exit)));
         let [y, z] = loads.map(|load| at_exit(&load));
-        let seat = self.seat(&Answer {
+        let answer = Answer {
             slope: Vector2::new(y[1], z[1]),
             force_n: Vector2::new(y[0], z[0]),
             by: held(by_exit, by_moment),
-        });
+        };
+        let beside = slip.is_some_and(
+            |Slip {
+                 by_m: [y_m, z_m], ..
+             }| {
+                self.strength == 0.0 || y_m * self.towards[1] != z_m * self.towards[0]
+            },
+        );
+        let seat = self.seat(&answer, beside);
         let mut shape = vec![[0.0; 2]; path.len()];
         let mut slopes = shape.clone();
         for plane in 0..2 {
@@ -490,9 +498,21 @@ impl<'c> Case<'c> {
         }
     }
 
-    fn seat(&self, answer: &Answer) -> Seat {
+    /// Where the needle rests in its guide; `beside` if it is also loaded beside the direction of the tip's force.
+    fn seat(&self, answer: &Answer, beside: bool) -> Seat {
         match &self.bore {
-            Some(bore) => bore.seat(answer),
+            Some(bore) if beside => bore.seat(answer),
+            Some(bore) => {
+                let (towards, by) = (Vector2::from(self.towards), &answer.by);
+                let along = [answer.force_n, answer.slope].map(|each| each.dot(&towards));
+                let rest = bore.seat_along(along, by, &Rest::MIDDLE);
+                let turned = by.slope_by_exit * rest.exit_m + by.slope_by_moment * rest.moment_nm;
+                Seat {
+                    exit_m: towards * rest.exit_m,
+                    moment_nm: towards * rest.moment_nm,
+                    slope: towards * (along[1] + turned),
+                }
+            }
             None => Seat {
                 exit_m: Vector2::zeros(),
                 moment_nm: Vector2::zeros(),

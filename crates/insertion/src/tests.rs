@@ -92,6 +92,22 @@ fn in_air_it_is_the_beam_of_the_textbook() {
     }
 }
 
+/// Tissue that is as soft as air has the short elements of any tissue, where a stiffness by both nodes loses 2e-5.
+#[test]
+fn short_elements_hardly_round() {
+    let needle = gauge(18);
+    let (ei, force_n, length_m): (_, _, f64) = (needle.bending_stiffness_nm2(), 0.1, 0.1);
+    let soft = layers(&[
+        [0.02, 1e-10, force_n],
+        [0.03, 2e-10, force_n],
+        [0.04, 3e-10, force_n],
+    ]);
+    let supported = force_n * length_m.powi(2) * (length_m + 0.05) / (3.0 * ei);
+    close(tip(&needle, &guide(0.0), 0.01, &soft), supported, 1e-11);
+    let clamped = force_n * length_m.powi(3) / (3.0 * ei);
+    close(tip(&needle, &Holder::Clamp, 0.01, &soft), clamped, 1e-11);
+}
+
 #[test]
 fn far_in_one_tissue_the_path_is_a_circle() {
     for (number, stiffness) in [(18, 2e4), (22, 2e4), (22, 1.5e5), (20, 2e3)] {

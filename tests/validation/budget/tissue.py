@@ -117,10 +117,10 @@ wall_spread = 1.1
 [imperfections.guide]
 diametral_clearance_mm = 0.3
 """
-# A guide that fits, to a micrometre.
+# A guide that fits.
 FITS = """
 [imperfections.guide]
-diametral_clearance_mm = 0.001
+diametral_clearance_mm = 0
 """
 VARIANTS = [
     Variant("known", 18, TISSUE + 'bevel = "superior"', ["shallow", "deep"]),

@@ -133,6 +133,15 @@ impl TissueNeedle {
         }
     }
 
+    /// What holds it: a bore without play leaves it no angle.
+    fn holder(&self) -> Holder {
+        if self.guide.play_m > 0.0 {
+            Holder::Guide(self.guide)
+        } else {
+            Holder::Clamp
+        }
+    }
+
     /// Layers with what they do to a needle.
     ///
     /// # Errors
@@ -169,8 +178,13 @@ impl TissueNeedle {
             angle_rad: self.bevel_rad,
             turn_at_m: self.turn_at_m,
         };
-        let holder = Holder::Guide(self.guide);
-        Ok(solve(&draw.needle, &holder, stand_off_m, &layers, &bevel)?)
+        Ok(solve(
+            &draw.needle,
+            &self.holder(),
+            stand_off_m,
+            &layers,
+            &bevel,
+        )?)
     }
 
     /// Where a needle is pushed on its way, if that is known: see [`NeedlePath::pushed_towards`].
@@ -205,7 +219,7 @@ impl TissueNeedle {
     ) -> Result<Carried, TissueError> {
         let medians = self.medians();
         let layers = self.layers(&medians, path)?;
-        let (needle, holder) = (&medians.needle, Holder::Guide(self.guide));
+        let (needle, holder) = (&medians.needle, self.holder());
         let bevel = Bevel {
             towards: [0.0; 2],
             angle_rad: self.bevel_rad,
