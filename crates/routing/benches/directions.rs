@@ -102,6 +102,7 @@ fn directions(criterion: &mut Criterion) {
             lung_vessel_m: 3e-3,
             below_rib_m: 3e-3,
             beside_sternum_m: 20e-3,
+            hu: None,
             threads: 1,
             cancel: &GO,
         };

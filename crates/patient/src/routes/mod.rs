@@ -157,6 +157,7 @@ impl RouteTask<'_> {
             lung_vessel_m: self.rules.lung_vessel_mm * 1e-3,
             below_rib_m: self.rules.below_rib_mm * 1e-3,
             beside_sternum_m: self.rules.beside_sternum_mm * 1e-3,
+            hu: None,
             threads: control.threads,
             cancel: control.cancel,
         };

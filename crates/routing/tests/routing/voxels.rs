@@ -114,7 +114,7 @@ fn rules() -> RouteRules {
 }
 
 /// Options about a target without a lesion, with what is modelled beside bone.
-fn usual() -> VoxelOptions<'static> {
+pub(crate) fn usual() -> VoxelOptions<'static> {
     VoxelOptions {
         patient: None,
         lesions: &[],
@@ -125,6 +125,7 @@ fn usual() -> VoxelOptions<'static> {
         lung_vessel_m: 0.0,
         below_rib_m: 3e-3,
         beside_sternum_m: 20e-3,
+        hu: None,
         threads: 1,
         cancel: &GO,
     }
