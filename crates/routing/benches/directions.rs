@@ -85,6 +85,7 @@ fn rules() -> RouteRules {
         cross_bullae: false,
         throw_m: 5e-3,
         odds: OddsSection::default(),
+        needle: None,
     }
 }
 

@@ -110,6 +110,7 @@ fn rules() -> RouteRules {
         cross_bullae: false,
         throw_m: 0.008,
         odds: OddsSection::default(),
+        needle: None,
     }
 }
 
