@@ -230,7 +230,8 @@ impl<'c> Case<'c> {
             let mut from_m = begin_m;
             if layer.stiffness_n_m2 > before_n_m2 {
                 let mut length_m = FIRST_M;
-                while length_m < element_m && from_m + length_m < end_m {
+                // What is left is no sliver, which would round.
+                while length_m < element_m && from_m + length_m + FIRST_M < end_m {
                     add(from_m, from_m + length_m, &mut depths_m, &mut elements);
                     from_m += length_m;
                     length_m *= GROWTH;
