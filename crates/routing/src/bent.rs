@@ -81,6 +81,9 @@ impl RouteNeedle {
         let [.., [before_m, off_before_m], [end_m, off_m]] = path_m[..] else {
             return None;
         };
+        if path_m.iter().any(|[_, off_m]| !off_m.is_finite()) {
+            return None;
+        }
         // Thrown, it goes on as it points.
         if end_m + throw_m > 1e-9 {
             let slope = (off_m - off_before_m) / (before_m - end_m);

@@ -16,7 +16,7 @@ use needlebench_scenario::{
 use needlebench_volume::{LabelMap, VoxelGrid};
 
 use crate::solids::{counts, rules};
-use crate::voxels::usual;
+use crate::voxels::{self, usual};
 
 const STANDOFF_M: f64 = 0.015;
 
@@ -236,4 +236,53 @@ fn a_needle_that_bends_towards_bone_is_refused_by_what_it_bends() {
         reason.contains("left 5th rib") && reason.contains("3.5 mm asked for"),
         "{reason}"
     );
+}
+
+#[test]
+fn bent_needles_of_free_routes_are_as_far_from_every_voxel_as_they_say() {
+    let labels = voxels::chest(false);
+    let anatomy = voxels::anatomy(&labels, 1);
+    let needle = needle(1.0);
+    let facing = BevelFacing::Along(Vector3::z());
+    let rules = with_needle(&voxels::rules(), needle.clone(), facing);
+    let found = search(&anatomy, &rules, 1500, 2, &|| false);
+    let straight = search(&anatomy, &voxels::rules(), 1500, 2, &|| false);
+    let bent = found
+        .candidates
+        .iter()
+        .filter(|each| each.straight.is_some());
+    assert_eq!(found.free().len() + bent.count(), straight.free().len());
+    let boxes = voxels::boxes_of(&labels, Obstacle::Bone);
+    let free = found.free();
+    assert!(free.len() > 10, "{}", free.len());
+    for (number, route) in free.iter().enumerate() {
+        let ray = Ray {
+            target: anatomy.target(),
+            outwards: route.outwards,
+        };
+        let bend = route.bend.as_ref().unwrap();
+        let layers = anatomy.layers(&ray, [0.0, route.depth_m]).unwrap();
+        assert!((bend.tip_m - bend_m(&needle, layers)).abs() < 1e-12);
+        // Bends of an 18 G at such depths, whatever the layers are.
+        assert!((1e-4..4e-3).contains(&bend.tip_m), "{}", bend.tip_m);
+        let told_m = bend.distances_m[Obstacle::Bone as usize];
+        assert!(told_m >= rules.margins_m[Obstacle::Bone as usize]);
+        if number % 10 > 0 {
+            continue;
+        }
+        let towards = bend.towards.unwrap();
+        for ends in bend.path_m.windows(2) {
+            let at = |[along_m, off_m]: [f64; 2]| ray.at(along_m) + towards * off_m;
+            let (outwards, length_m) = UnitVector3::new_and_get(at(ends[0]) - at(ends[1]));
+            let stretch = Ray {
+                target: at(ends[1]),
+                outwards,
+            };
+            let brute_m = voxels::brute_m(&boxes, &stretch, [0.0, length_m]);
+            assert!(
+                brute_m - 0.5 * needle.needle.outer_m >= told_m,
+                "{brute_m} {told_m}"
+            );
+        }
+    }
 }
