@@ -87,6 +87,7 @@ const LAYERS: [(&str, &[&str]); 37] = [
         "routing",
         &[
             "imaging",
+            "insertion",
             "volume",
             "scenario",
             "phantom",

@@ -263,7 +263,8 @@ impl<'c> Case<'c> {
             end_m += layer.length_m;
             let (mut short, mut from_m, mut length_m) = (0.0, begin_m, FIRST_M);
             if layer.stiffness_n_m2 > before_n_m2 {
-                while length_m < self.element_m && from_m + length_m < end_m {
+                // What is left is no sliver, which would round.
+                while length_m < self.element_m && from_m + length_m + FIRST_M < end_m {
                     short += 1.0;
                     from_m += length_m;
                     length_m *= GROWTH;

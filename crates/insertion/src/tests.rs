@@ -342,6 +342,29 @@ fn a_layer_without_force_is_passed() {
 }
 
 #[test]
+fn layers_that_end_just_behind_an_element_bend_as_their_neighbours() {
+    // Ends of the first elements in tissue that is stiffer, each longer by the same factor.
+    let ends_m = [12, 16, 18].map(|count| 4e-5 * (libm::pow(1.15, f64::from(count)) - 1.0) / 0.15);
+    let needle = gauge(18);
+    let bent = |length_m: f64| {
+        let wall = [length_m, 2e4, 0.09];
+        let chest = layers(&[
+            [0.01, 5e3, 0.05],
+            wall,
+            [0.05, 2e3, 0.02],
+            [0.01, 2e4, 0.09],
+        ]);
+        tip(&needle, &guide(6e-5), 0.01, &chest)
+    };
+    for end_m in ends_m {
+        for behind_m in [1e-5, 1e-6, 1e-8, 1e-10, 1e-13] {
+            // Other elements make 0.2 % of it.
+            close(bent(end_m + behind_m), bent(end_m + 2e-4), 1e-2);
+        }
+    }
+}
+
+#[test]
 fn a_slip_of_nothing_changes_nothing() {
     let tissue = layers(&[[0.03, 2e4, 0.1], [0.05, 2e3, 0.025], [0.01, 2e4, 0.1]]);
     let (needle, holder) = (gauge(20), guide(1e-4));

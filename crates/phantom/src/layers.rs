@@ -24,6 +24,29 @@ pub struct PassedLayer {
     pub length_m: f64,
 }
 
+impl PassedLayer {
+    /// Stretches on the way, the outermost first, as layers: those in one tissue are one, those below 1 mm are what is
+    /// beside them. Where nobody knows what is fat, the wall begins with 10 mm of it (assumed), half of it at most.
+    pub fn layers(stretches: impl IntoIterator<Item = Self>, is_fat_known: bool) -> Vec<Self> {
+        let mut joined = Vec::new();
+        for stretch in stretches {
+            join(&mut joined, stretch);
+        }
+        let mut layers = without_short(&joined);
+        let outermost = layers.first_mut().filter(|_| !is_fat_known);
+        if let Some(first) = outermost.filter(|first| first.tissue == Passed::Wall) {
+            let fat_m = FAT_M.min(FAT_SHARE * first.length_m);
+            first.length_m -= fat_m;
+            let fat = Self {
+                tissue: Passed::Fat,
+                length_m: fat_m,
+            };
+            layers.insert(0, fat);
+        }
+        layers
+    }
+}
+
 /// Why it is not known what a needle passes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LayersError {
@@ -63,8 +86,7 @@ impl Phantom {
             .chain([0.0, 1.0])
             .collect();
         ends.sort_by(f64::total_cmp);
-        let mut layers: Vec<PassedLayer> = Vec::new();
-        for pair in ends.windows(2) {
+        let stretches = ends.windows(2).map(|pair| {
             let middle = 0.5 * (pair[0] + pair[1]);
             let is_in = |stretches: &[[f64; 2]]| {
                 stretches
@@ -72,31 +94,12 @@ impl Phantom {
                     .any(|[from, to]| (*from..=*to).contains(&middle))
             };
             let innermost = within.iter().rfind(|(_, stretches)| is_in(stretches));
-            let tissue = innermost.map_or(Passed::Wall, |(kind, _)| *kind);
-            join(
-                &mut layers,
-                PassedLayer {
-                    tissue,
-                    length_m: (pair[1] - pair[0]) * length_m,
-                },
-            );
-        }
-        let mut layers = without_short(&layers);
-        if let Some(first) = layers
-            .first_mut()
-            .filter(|first| first.tissue == Passed::Wall)
-        {
-            let fat_m = FAT_M.min(FAT_SHARE * first.length_m);
-            first.length_m -= fat_m;
-            layers.insert(
-                0,
-                PassedLayer {
-                    tissue: Passed::Fat,
-                    length_m: fat_m,
-                },
-            );
-        }
-        Ok(layers)
+            PassedLayer {
+                tissue: innermost.map_or(Passed::Wall, |(kind, _)| *kind),
+                length_m: (pair[1] - pair[0]) * length_m,
+            }
+        });
+        Ok(PassedLayer::layers(stretches, false))
     }
 
     /// The bones that a needle passes, but for those that hold its end; phantom frame.

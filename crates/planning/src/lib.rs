@@ -34,5 +34,5 @@ pub use reach::out_of_reach_m;
 pub use rejection::Rejection;
 pub use route::{
     RouteClearance, RouteJudgement, bent_route, crossed_fissures, judge_route, judge_route_beside,
-    judged_tissues, needle_route, route_rejection,
+    judged_straight, judged_tissues, needle_route, route_rejection,
 };

@@ -270,9 +270,28 @@ pub fn judged_tissues<'a>(
     placed: &'a PlacedPhantom,
     goal: &Goal,
 ) -> impl Iterator<Item = RouteJudgement<'a>> {
+    judged(resolved, Passage::new(resolved, placed, goal))
+}
+
+/// [`judged_tissues`] of the straight needle alone.
+pub fn judged_straight<'a>(
+    resolved: &ResolvedScenario,
+    placed: &'a PlacedPhantom,
+    goal: &Goal,
+) -> impl Iterator<Item = RouteJudgement<'a>> {
+    let passage = Passage {
+        bent: Vec::new(),
+        ..Passage::new(resolved, placed, goal)
+    };
+    judged(resolved, passage)
+}
+
+fn judged<'a>(
+    resolved: &ResolvedScenario,
+    passage: Passage<'a, '_>,
+) -> impl Iterator<Item = RouteJudgement<'a>> {
     let section = &resolved.scenario.planning.needle_route;
     let tissues = [Tissue::Bone, Tissue::Vessel, Tissue::Organ].into_iter();
-    let passage = Passage::new(resolved, placed, goal);
     tissues.filter_map(move |tissue| {
         let margin_m = margin_m(section, tissue)?;
         let wanted = |part: &RouteObstacle| part.tissue == tissue && !is_off(section, part);

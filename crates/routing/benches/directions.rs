@@ -85,6 +85,7 @@ fn rules() -> RouteRules {
         cross_bullae: false,
         throw_m: 5e-3,
         odds: OddsSection::default(),
+        needle: None,
     }
 }
 
@@ -102,6 +103,7 @@ fn directions(criterion: &mut Criterion) {
             lung_vessel_m: 3e-3,
             below_rib_m: 3e-3,
             beside_sternum_m: 20e-3,
+            hu: None,
             threads: 1,
             cancel: &GO,
         };

@@ -1,6 +1,7 @@
 //! The anatomy along a needle path.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
+use needlebench_phantom::{LayersError, PassedLayer};
 
 /// An obstacle of a needle path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -108,6 +109,12 @@ pub trait Anatomy: Sync {
 
     /// The lungs on the way between two distances from the target, m.
     fn lungs(&self, ray: &Ray, from_to_m: [f64; 2]) -> LungPassage;
+
+    /// The tissues of a needle on a ray between two distances from the target, m, the outermost first.
+    ///
+    /// # Errors
+    /// [`LayersError::Bone`].
+    fn layers(&self, ray: &Ray, from_to_m: [f64; 2]) -> Result<Vec<PassedLayer>, LayersError>;
 
     /// How far behind the target the lung that it is in is left, m, if that is nearer than `within_m`; none where the
     /// target is in no lung.

@@ -4,6 +4,7 @@ use needlebench_cell::Tool;
 use needlebench_scenario::scenario::{NeedleRouteSection, OddsSection, RouteSection};
 
 use crate::Obstacle;
+use crate::bent::RouteNeedle;
 
 /// Why a direction is not an admissible needle path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -32,6 +33,8 @@ pub enum RouteRule {
     Throw,
     /// Too oblique to the skin.
     Oblique,
+    /// Bent by tissue, the needle comes too close to bone, a vessel or an organ.
+    Bent,
     /// Guide or entry would be in the table or in another object.
     Blocked,
     /// No configuration of the robot is feasible.
@@ -40,7 +43,7 @@ pub enum RouteRule {
 
 impl RouteRule {
     /// All of them, in the order of evaluation.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::NoSkin,
         Self::End,
         Self::NeedleTooShort,
@@ -53,6 +56,7 @@ impl RouteRule {
         Self::Bulla,
         Self::Throw,
         Self::Oblique,
+        Self::Bent,
         Self::Blocked,
         Self::Robot,
     ];
@@ -72,6 +76,7 @@ impl RouteRule {
             Self::Fissure => "fissure",
             Self::Bulla => "bulla",
             Self::Throw => "throw",
+            Self::Bent => "bent",
             Self::Blocked => "blocked",
             Self::Robot => "robot",
         }
@@ -92,6 +97,7 @@ impl RouteRule {
             Self::Fissure => "crosses a fissure",
             Self::Bulla => "crosses a bulla",
             Self::Throw => "needle throw not free",
+            Self::Bent => "bent needle too close to bone, vessel or organ",
             Self::Blocked => "guide in table or other object",
             Self::Robot => "no feasible robot configuration",
         }
@@ -108,7 +114,10 @@ impl RouteRule {
 
     /// Whether its limit is a minimum; otherwise it is a maximum.
     pub fn is_least(self) -> bool {
-        matches!(self, Self::Bone | Self::Vessel | Self::Organ | Self::Throw)
+        matches!(
+            self,
+            Self::Bone | Self::Vessel | Self::Organ | Self::Throw | Self::Bent
+        )
     }
 
     /// The rule about an obstacle.
@@ -162,6 +171,8 @@ pub struct RouteRules {
     pub throw_m: f64,
     /// Odds ratios.
     pub odds: OddsSection,
+    /// The needle that bends in tissue, which keeps the same margins bent; none where no needle is known.
+    pub needle: Option<RouteNeedle>,
 }
 
 /// The default standard deviation of the tip without a robot, m (assumed; see `tip_sd_mm`).
@@ -196,6 +207,7 @@ impl RouteRules {
             cross_bullae: section.cross_bullae,
             throw_m: section.throw_mm * 1e-3,
             odds: section.odds.clone(),
+            needle: None,
         };
         rules.margins_m = Obstacle::ALL.map(|obstacle| rules.margin_m(obstacle, 0.0, tip_sd_m));
         rules

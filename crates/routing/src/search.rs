@@ -3,9 +3,11 @@
 use std::cmp::Ordering;
 
 use nalgebra::UnitVector3;
+use needlebench_cell::part_in_words;
 use needlebench_parallel::in_parallel;
 
 use crate::anatomy::{Anatomy, Exit, LungPassage, Obstacle, Ray, angle_rad};
+use crate::bent::Bend;
 use crate::directions::{around, evenly};
 use crate::risk::Risk;
 use crate::rules::{Refusal, RouteRule, RouteRules};
@@ -23,7 +25,7 @@ pub struct Route {
     /// Lower bounds of the needle's distances from the skin to the target and behind it, as far as it is thrown, m, in
     /// the order of [`Obstacle::ALL`]; infinite where there is nothing.
     pub distances_m: [f64; 3],
-    /// Least distance beyond the margins of [`RouteRules::margins_m`], m.
+    /// Least distance beyond the margins of [`RouteRules::margins_m`], m, of the straight needle and of the bent one.
     pub spare_m: f64,
     /// Angle between the needle and the skin's normal, rad.
     pub skin_angle_rad: f64,
@@ -31,6 +33,8 @@ pub struct Route {
     pub lungs: LungPassage,
     /// How it compares.
     pub risk: Risk,
+    /// The needle as tissue bends it; none where it is not known to which side.
+    pub bend: Option<Bend>,
 }
 
 impl Route {
@@ -50,6 +54,8 @@ pub struct Candidate {
     pub depth_m: Option<f64>,
     /// A needle path, or the rule that rejects it.
     pub outcome: Result<Route, Refusal>,
+    /// What it would be for the straight needle, where only the bent one breaks a rule.
+    pub straight: Option<Box<Route>>,
 }
 
 /// What was found of all directions.
@@ -143,14 +149,77 @@ pub fn judge(anatomy: &dyn Anatomy, rules: &RouteRules, outwards: &UnitVector3<f
         outwards: *outwards,
     };
     let exit = anatomy.exit(&ray);
+    let (outcome, straight) = match route(anatomy, rules, &ray, exit) {
+        Ok(straight) => bent(anatomy, rules, &ray, straight),
+        refused @ Err(_) => (refused, None),
+    };
     Candidate {
         outwards: *outwards,
         depth_m: match exit {
             Exit::Skin(depth_m) => Some(depth_m),
             Exit::End(_) | Exit::Nowhere => None,
         },
-        outcome: route(anatomy, rules, &ray, exit),
+        outcome,
+        straight,
     }
+}
+
+/// A path of the straight needle with the bend of the one that is known, or what that breaks.
+fn bent(
+    anatomy: &dyn Anatomy,
+    rules: &RouteRules,
+    ray: &Ray,
+    mut straight: Route,
+) -> (Result<Route, Refusal>, Option<Box<Route>>) {
+    let Some(needle) = rules.needle.as_ref().filter(|needle| needle.has_side()) else {
+        return (Ok(straight), None);
+    };
+    straight.bend = needle.bend(anatomy, ray, straight.depth_m, rules.throw_m);
+    let broken = match &straight.bend {
+        // Nothing is known of it, so it keeps no margin.
+        None => Some((f64::NEG_INFINITY, 0.0)),
+        Some(bend) if bend.towards.is_none() => None,
+        Some(bend) => {
+            let bent_m = spare_m(rules, &bend.distances_m);
+            straight.spare_m = straight.spare_m.min(bent_m);
+            worst(rules, &bend.distances_m).map(|(_, distance_m, margin_m)| (distance_m, margin_m))
+        }
+    };
+    match broken {
+        None => (Ok(straight), None),
+        Some((value, limit)) => {
+            let rule = RouteRule::Bent;
+            (
+                Err(Refusal { rule, value, limit }),
+                Some(Box::new(straight)),
+            )
+        }
+    }
+}
+
+/// Why only the bent needle breaks a rule on a path, for people; none where it breaks none.
+pub fn bent_reason(anatomy: &dyn Anatomy, rules: &RouteRules, route: &Route) -> Option<String> {
+    rules.needle.as_ref()?;
+    let Some(bend) = &route.bend else {
+        return Some("nobody knows how the needle bends there".to_owned());
+    };
+    let (obstacle, distance_m, margin_m) = worst(rules, &bend.distances_m)?;
+    let ray = Ray {
+        target: anatomy.target(),
+        outwards: route.outwards,
+    };
+    let name = bend
+        .nearest(anatomy, &ray, obstacle)
+        .map(|nearest| nearest.name);
+    let [bend, distance, margin] =
+        [bend.tip_m.abs(), distance_m, margin_m].map(|m| format!("{:.1} mm", m * 1e3));
+    let name = name.unwrap_or_else(|| obstacle.name().to_owned());
+    let name = part_in_words(&name);
+    Some(if distance_m > 0.0 {
+        format!("bent by {bend} it comes within {distance} of {name}; {margin} asked for")
+    } else {
+        format!("bent by {bend} it meets {name}; {margin} asked for")
+    })
 }
 
 fn route(
@@ -212,6 +281,7 @@ fn route(
         skin_angle_rad,
         risk: Risk::new(&rules.odds, &ray.outwards, &lungs, touches, diameter_m),
         lungs,
+        bend: None,
     })
 }
 

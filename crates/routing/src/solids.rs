@@ -3,7 +3,7 @@
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_geometry::mesh::SurfaceIndex;
 use needlebench_kinematics::Pose;
-use needlebench_phantom::{Phantom, PhantomPart, RouteObstacle, Tissue};
+use needlebench_phantom::{LayersError, PassedLayer, Phantom, PhantomPart, RouteObstacle, Tissue};
 use needlebench_scenario::scenario::NeedleRouteSection;
 
 use crate::anatomy::{
@@ -268,6 +268,10 @@ impl Anatomy for SolidAnatomy<'_> {
             }
         }
         passage
+    }
+
+    fn layers(&self, ray: &Ray, [from_m, to_m]: [f64; 2]) -> Result<Vec<PassedLayer>, LayersError> {
+        self.phantom.layers(&ray.at(to_m), &ray.at(from_m))
     }
 
     fn leaves_lung_m(&self, ray: &Ray, within_m: f64) -> Option<f64> {

@@ -39,11 +39,11 @@ pub use family::{
 pub use log_columns::{LogColumns, MappedColumns};
 pub use marker_list::{ListedMarker, MarkerFrame, MarkerList, marker_list_schema};
 pub use resolve::{
-    ASSUMED_BODY, ChooseEntry, ChosenEntry, EntryChooser, Expectation, Expected, FOOT_M, Goal,
-    GoalPlacer, GravitySettings, NeedlePath, NoEntry, OpenScenario, Overrides, PlacedPhantom,
-    RIGID_M, ResolvedScenario, Roll, ServoSettings, direction, excitation, imperfections, iso9283,
-    load_open_scenario, load_robot, load_scenario, name_from_file, people, pose_of,
-    resolve_open_scenario, resolve_scenario,
+    ASSUMED_BODY, BevelFacing, ChooseEntry, ChosenEntry, EntryChooser, Expectation, Expected,
+    FOOT_M, Goal, GoalPlacer, GravitySettings, NeedlePath, NoEntry, OpenScenario, Overrides,
+    PlacedPhantom, RIGID_M, ResolvedScenario, Roll, RunsAlong, ServoSettings, bevel_clock,
+    direction, excitation, imperfections, iso9283, load_open_scenario, load_robot, load_scenario,
+    name_from_file, people, pose_of, resolve_open_scenario, resolve_scenario,
 };
 pub use scenario::{envelope, ranking};
 pub use scenario_edit::ScenarioEdit;

@@ -4,7 +4,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{Point3, UnitVector3};
 use needlebench_patient::routes::FreeRoutes;
-use needlebench_routing::{Anatomy, Obstacle, RouteRules, VoxelAnatomy, judge};
+use needlebench_routing::{
+    Anatomy, Candidate, Obstacle, RouteRules, VoxelAnatomy, bent_reason, judge,
+};
 use serde::Serialize;
 
 /// The voxels around the target of the last request.
@@ -32,6 +34,9 @@ pub struct Judged {
     pub free: bool,
     /// The first rule that it violates, in words.
     pub broken: Option<&'static str>,
+    /// What the needle as tissue bends it comes too close to, where that is the rule.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bent: Option<String>,
     /// The value of that rule, in `unit`.
     pub value: Option<f64>,
     /// Its limit.
@@ -73,12 +78,16 @@ impl LastTarget {
         if around.goal != goal || (around.target - target).norm() > 1e-9 {
             return None;
         }
-        let outcome = judge(&around.anatomy, &around.rules, outwards).outcome;
+        let Candidate {
+            outcome, straight, ..
+        } = judge(&around.anatomy, &around.rules, outwards);
+        let bent = straight.and_then(|route| bent_reason(&around.anatomy, &around.rules, &route));
         let (route, refusal) = (outcome.as_ref().ok(), outcome.as_ref().err());
         let unseen = |obstacle: &Obstacle| !around.anatomy.knows(*obstacle);
         Some(Judged {
             free: route.is_some(),
             broken: refusal.map(|refusal| refusal.rule.in_words()),
+            bent,
             value: refusal.map(|refusal| refusal.value),
             limit: refusal.map(|refusal| refusal.limit),
             is_least: refusal.is_some_and(|refusal| refusal.rule.is_least()),

@@ -135,7 +135,7 @@ fn around(
     let made = Arc::new(Around {
         goal: section.name.clone(),
         target,
-        anatomy: task.voxels(case.built(), control)?,
+        anatomy: task.voxels(case.built(), Some(case.hu()), control)?,
         rules,
         free: OnceLock::new(),
     });

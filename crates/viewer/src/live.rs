@@ -438,8 +438,10 @@ fn refusal(tissues: &[TissueAnswer], judged: Option<&Judged>) -> Option<String> 
             format!("clearance {mm:.1} mm to {words} ({tissue}), {required_mm:.1} mm required")
         });
     }
-    let broken = judged.and_then(|judged| judged.broken)?;
-    Some(format!("path rule: {broken}"))
+    let judged = judged?;
+    let broken = judged.broken?;
+    let bent = judged.bent.iter().map(|bent| format!(", {bent}"));
+    Some(format!("path rule: {broken}{}", bent.collect::<String>()))
 }
 
 fn surface_p99_m(case: &Case, part: &str) -> Option<f64> {

@@ -5,7 +5,7 @@
 //! 1. Directions from the target, 3 deg apart all round, are placed as a scenario with such a goal is: the needle has
 //!    to be long enough, nothing may stand where guide and needle are, it may not enter at the ends of the chest, where
 //!    the phantom lacks clavicles and vessels, nor be oblique to the skin by more than 60 deg, and has to keep its
-//!    margins to bone, vessels and organs.
+//!    margins to bone, vessels and organs: straight, and as tissue bends it where the needle is known.
 //! 2. Those that are left are ordered by score. From the best on, each is moved by up to 2 deg to where its score is
 //!    best, and is looked at with the robot: as many configurations as the scenario wants are feasible, by the code of
 //!    `check`. Entries nearer than 15 mm to a better one are left out, those near one where the robot fails too.
@@ -16,9 +16,11 @@ use std::f64::consts::FRAC_PI_3;
 use nalgebra::Point3;
 use needlebench_clearance::ClearanceModel;
 use needlebench_parallel::{Control, in_parallel};
+use needlebench_patient::routes::{RouteTask, WithRobot};
 use needlebench_patient::{Refused, SuggestError, counted};
-use needlebench_planning::{Planner, crossed_fissures, judged_tissues};
-use needlebench_scenario::scenario::GoalSection;
+use needlebench_planning::{Planner, crossed_fissures, judged_straight};
+use needlebench_routing::{Anatomy, Obstacle, Ray, RouteNeedle, SolidAnatomy};
+use needlebench_scenario::scenario::{GoalSection, RouteSection};
 use needlebench_scenario::{Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction};
 use needlebench_study::Outcome;
 use serde::Serialize;
@@ -123,13 +125,15 @@ pub enum EntryRule {
     Vessel,
     /// Through an organ or too near to it.
     Organ,
+    /// Too near to one of them once tissue bends the needle.
+    Bent,
     /// Too few configurations of the robot work there.
     Robot,
 }
 
 impl EntryRule {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::NeedleTooShort,
         Self::Blocked,
         Self::End,
@@ -137,6 +141,7 @@ impl EntryRule {
         Self::Bone,
         Self::Vessel,
         Self::Organ,
+        Self::Bent,
         Self::Robot,
     ];
 
@@ -150,6 +155,7 @@ impl EntryRule {
             Self::Bone => "bone",
             Self::Vessel => "vessel",
             Self::Organ => "organ",
+            Self::Bent => "bent",
             Self::Robot => "robot",
         }
     }
@@ -164,6 +170,7 @@ impl EntryRule {
             Self::Bone => "bone on the path",
             Self::Vessel => "vessel on the path",
             Self::Organ => "another organ on the path",
+            Self::Bent => "bent needle too close to bone, vessel or organ",
             Self::Robot => "infeasible for the robot",
         }
     }
@@ -196,6 +203,18 @@ pub struct TissueMargin {
     pub margin_m: f64,
 }
 
+/// A needle as tissue bends it: to where its bevel pushes it, or to the worst of twelve sides where that is not known.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BentMargins {
+    /// How far the tip is off the axis, m.
+    pub bend_m: f64,
+    /// Whether it is known to which side: only then does the bent needle have to keep the margins. A bend to any side is part
+    /// of the error that they are for.
+    pub is_side_known: bool,
+    /// What the bent needle keeps from bone, vessels and organs.
+    pub bent_margins: Vec<TissueMargin>,
+}
+
 /// A proposed entry.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Entry {
@@ -211,6 +230,10 @@ pub struct Entry {
     pub angle_to_skin_normal_rad: f64,
     /// What the needle keeps from bone, vessels and organs.
     pub margins: Vec<TissueMargin>,
+    /// How far tissue bends the median needle off its axis at the tip, and what it keeps then; none where no needle is
+    /// known.
+    #[serde(flatten)]
+    pub bent: Option<BentMargins>,
     /// Fissures of the lungs that it crosses.
     pub fissures_crossed: Vec<String>,
     /// Configurations that are feasible there, by their final postures.
@@ -268,6 +291,7 @@ struct Allowed {
     entry: Point3<f64>,
     angle_rad: f64,
     margins: Vec<TissueMargin>,
+    bent: Option<BentMargins>,
     fissures: Vec<String>,
     score: f64,
 }
@@ -280,6 +304,8 @@ struct Judge<'a> {
     section: GoalSection,
     /// Phantom frame.
     target: Point3<f64>,
+    /// For the needle as tissue bends it; none where no needle is known.
+    bends: Option<(SolidAnatomy<'a>, RouteNeedle)>,
     /// What the scenario's criteria want of the route beside its margins, m.
     criterion_m: f64,
 }
@@ -308,6 +334,14 @@ impl Judge<'_> {
         if tool.needle.length_m < needed_m {
             return Err(EntryRule::NeedleTooShort);
         }
+        let ray = Ray {
+            target: self.target,
+            outwards,
+        };
+        let mut bends = self.bends.iter();
+        if bends.any(|(anatomy, _)| anatomy.layers(&ray, [0.0, depth_m]).is_err()) {
+            return Err(EntryRule::Bone);
+        }
         let goal = self.placer.place(&self.section_at(direction_deg));
         let goal = goal.map_err(|_| EntryRule::Blocked)?;
         let to_phantom = placed.world_from_phantom.inverse();
@@ -323,7 +357,7 @@ impl Judge<'_> {
         if angle_rad > STEEPEST_RAD {
             return Err(EntryRule::Oblique);
         }
-        let margins: Vec<TissueMargin> = judged_tissues(resolved, placed, &goal)
+        let margins: Vec<TissueMargin> = judged_straight(resolved, placed, &goal)
             .map(|judged| TissueMargin {
                 tissue: judged.nearest.part.tissue.to_string(),
                 part: judged.nearest.part.name.clone(),
@@ -331,14 +365,10 @@ impl Judge<'_> {
                 margin_m: judged.margin_m.max(self.criterion_m),
             })
             .collect();
-        let broken = margins
-            .iter()
-            .filter(|each| each.distance_m < each.margin_m);
-        let worst = broken
-            .min_by(|a, b| (a.distance_m - a.margin_m).total_cmp(&(b.distance_m - b.margin_m)));
-        if let Some(worst) = worst {
+        if let Some(worst) = worst(&margins) {
             return Err(EntryRule::of_name(&worst.tissue).unwrap_or(EntryRule::Organ));
         }
+        let bent = self.bent(&ray, depth_m, &margins)?;
         let mut allowed = Allowed {
             direction_deg,
             fissures: crossed_fissures(resolved, &goal),
@@ -346,10 +376,46 @@ impl Judge<'_> {
             entry,
             angle_rad,
             margins,
+            bent,
             score: 0.0,
         };
         allowed.score = score(&terms(&allowed, self.depth_m(&allowed), None));
         Ok(allowed)
+    }
+
+    /// The needle as tissue bends it, by the margins of the straight one; none where no needle is known.
+    fn bent(
+        &self,
+        ray: &Ray,
+        depth_m: f64,
+        margins: &[TissueMargin],
+    ) -> Result<Option<BentMargins>, EntryRule> {
+        let Some((anatomy, needle)) = &self.bends else {
+            return Ok(None);
+        };
+        // Here needles are not thrown.
+        let bend = needle.bend(anatomy, ray, depth_m, 0.0);
+        let bend = bend.ok_or(EntryRule::Bent)?;
+        let of_tissue = |straight: &TissueMargin| {
+            let mut obstacles = Obstacle::ALL.into_iter();
+            let obstacle = obstacles.find(|each| each.name() == straight.tissue)?;
+            let nearest = bend.nearest(anatomy, ray, obstacle)?;
+            Some(TissueMargin {
+                part: nearest.name,
+                distance_m: bend.distances_m[obstacle as usize],
+                ..straight.clone()
+            })
+        };
+        let bent_margins: Vec<TissueMargin> = margins.iter().filter_map(of_tissue).collect();
+        let is_side_known = bend.towards.is_some();
+        if is_side_known && worst(&bent_margins).is_some() {
+            return Err(EntryRule::Bent);
+        }
+        Ok(Some(BentMargins {
+            bend_m: bend.tip_m,
+            is_side_known,
+            bent_margins,
+        }))
     }
 
     fn depth_m(&self, allowed: &Allowed) -> f64 {
@@ -366,10 +432,21 @@ impl Judge<'_> {
     }
 }
 
+/// The margin with the largest shortfall.
+fn worst(margins: &[TissueMargin]) -> Option<&TissueMargin> {
+    let broken = margins
+        .iter()
+        .filter(|each| each.distance_m < each.margin_m);
+    broken.min_by(|a, b| (a.distance_m - a.margin_m).total_cmp(&(b.distance_m - b.margin_m)))
+}
+
 fn terms(allowed: &Allowed, depth_m: f64, working: Option<usize>) -> Vec<EntryTerm> {
+    let known = allowed.bent.iter().filter(|bent| bent.is_side_known);
+    let bent = known.flat_map(|bent| &bent.bent_margins);
     let spare_m = allowed
         .margins
         .iter()
+        .chain(bent)
         .map(|each| each.distance_m - each.margin_m)
         .fold(f64::INFINITY, f64::min);
     // Where there is nothing to keep away from there is all the room that counts.
@@ -426,7 +503,19 @@ pub fn suggest_entries(
     let placer = GoalPlacer::new(resolved);
     let target = placer.target(&section)?;
     let placed = resolved.phantom.as_ref().expect("a target is in a patient");
+    let by_routes = RouteTask {
+        resolved,
+        section: &section,
+        rules: &RouteSection::default(),
+        robot: WithRobot::No(String::new()),
+        directions: 0,
+    };
+    let route = &resolved.scenario.planning.needle_route;
+    let anatomy = || SolidAnatomy::new(&placed.phantom, target, section.lesion.is_some(), route);
+    let needle = by_routes.route_rules().needle;
+    let bends = needle.map(|needle| (anatomy(), needle));
     let judge = Judge {
+        bends,
         resolved,
         placed,
         placer,
@@ -556,6 +645,7 @@ impl Asked {
                     depth_m,
                     angle_to_skin_normal_rad: allowed.angle_rad,
                     margins: allowed.margins,
+                    bent: allowed.bent,
                     fissures_crossed: allowed.fissures,
                     working,
                     configurations,

@@ -9,8 +9,8 @@ mod grid;
 mod places;
 
 pub use entries::{
-    ENTRY_TERMS, Entry, EntryRule, EntrySample, EntrySearch, EntryTerm, TissueMargin, plan_entry,
-    suggest_entries,
+    BentMargins, ENTRY_TERMS, Entry, EntryRule, EntrySample, EntrySearch, EntryTerm, TissueMargin,
+    plan_entry, suggest_entries,
 };
 pub use places::{
     Place, PlaceGoal, PlaceSample, PlaceSearch, at_place, plan_place, suggest_places,

@@ -7,8 +7,11 @@ use nalgebra::{Point3, Vector3};
 use needlebench_bench::Preview;
 use needlebench_bench::suggest::suggest_entries;
 use needlebench_parallel::{Control, Silent};
-use needlebench_planning::judge_route;
-use needlebench_scenario::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily};
+use needlebench_planning::{bent_route, judge_route};
+use needlebench_scenario::scenario::GoalSection;
+use needlebench_scenario::{
+    Change, GoalPlacer, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, load_scenario,
+};
 
 use crate::directed::entering_by_direction;
 
@@ -115,4 +118,61 @@ fn no_entry_of_another_grid_is_much_better_than_the_first_proposal() {
         "{best} against {}",
         first.score
     );
+}
+
+/// Farthest that a needle is from the chords of 5 mm that distances are measured to, m: an eighth of a chord's square
+/// by a curvature of 4 per metre.
+const CHORD_M: f64 = 15e-6;
+
+/// How well skin and lungs are found along a line, m: a goal looks from its entry, a search from its target.
+const SURFACE_M: f64 = 1e-6;
+
+#[test]
+fn proposals_for_a_needle_in_tissue_keep_their_margins_bent_by_what_its_goal_says() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../guide/examples/tissue.toml");
+    let resolved = load_scenario(&path, &Overrides::default()).unwrap();
+    let control = Control {
+        threads: 2,
+        cancel: &AtomicBool::new(false),
+        progress: &Silent,
+    };
+    let section = &resolved.scenario.goals[0];
+    let found = suggest_entries(&resolved, section, 3, &control).unwrap();
+    assert!(!found.entries.is_empty());
+    let placed = resolved.phantom.as_ref().unwrap();
+    let expected = resolved.expected.as_ref().unwrap();
+    let needle = expected.imperfections.tissue().unwrap();
+    for entry in &found.entries {
+        let bent = entry.bent.as_ref().unwrap();
+        let margins = &bent.bent_margins;
+        assert!(margins.iter().all(|each| each.distance_m >= each.margin_m));
+        let goal = GoalSection {
+            entry_mm: None,
+            entry_direction_deg: Some(entry.direction_deg),
+            ..section.clone()
+        };
+        let goal = GoalPlacer::new(&resolved).place(&goal).unwrap();
+        let way = goal.needle_path.as_ref().unwrap();
+        let inserted = needle.insert(&needle.medians(), way, goal.standoff_m.unwrap());
+        let inserted = inserted.unwrap();
+        let bend_m = inserted.path_m.last().unwrap()[0];
+        assert!(
+            (bend_m - bent.bend_m).abs() < SURFACE_M,
+            "{bend_m} {}",
+            bent.bend_m
+        );
+        let [x, y] = way.pushed_towards.unwrap();
+        let aside = goal.world_from_guide_exit.rotation * Vector3::new(x, y, 0.0);
+        let places = inserted.depths_m.iter().zip(&inserted.path_m);
+        let points: Vec<Point3<f64>> = places
+            .map(|(at_m, [off_m, _])| {
+                goal.entry_m.unwrap() + goal.axis.into_inner() * *at_m + aside * *off_m
+            })
+            .collect();
+        let nearest = bent_route(&resolved.cell, placed, &goal, &points).unwrap();
+        let least_m = margins.iter().map(|each| each.distance_m);
+        let least_m = least_m.fold(f64::INFINITY, f64::min);
+        let off_m = (nearest.separation.distance_m - least_m).abs();
+        assert!(off_m < CHORD_M, "{off_m}");
+    }
 }

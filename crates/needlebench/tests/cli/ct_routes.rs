@@ -321,3 +321,61 @@ fn a_route_that_no_motion_serves_is_told_and_ends_with_1() {
     // The route is there to be looked into.
     assert!(bench.path("p.toml").exists());
 }
+
+/// What a needle in tissue adds to the routes of a scenario.
+#[test]
+fn routes_of_a_needle_in_tissue_keep_their_margins_bent() {
+    let text = fs::read_to_string(workspace().join("guide/examples/tissue.toml")).unwrap();
+    let unknown = text.replace("bevel = \"inferior\"\n", "");
+    let in_air = unknown.replace("model = \"tissue\"", "model = \"cantilever\"");
+    assert!(text != unknown && unknown != in_air);
+    let routes = |text: &str| {
+        let bench = Bench::with_scenario(text);
+        let arguments = "ct routes s.toml --no-robot --directions 1500 --json --out out";
+        let found = bench.run(arguments).exits_with(0).json();
+        let map = bench.read_json("out/routes.json")["targets"][0]["map"].clone();
+        let printed = bench.run("ct routes s.toml --no-robot --directions 1500");
+        (
+            found["targets"][0].clone(),
+            map,
+            printed.exits_with(0).stdout,
+        )
+    };
+    let [known, unknown, in_air] = [&text, &unknown, &in_air].map(|text| routes(text));
+    let count = |plan: &serde_json::Value| {
+        let refused = plan["refused"].list().iter();
+        let mut bent = refused.filter(|each| each["rule"] == "bent");
+        bent.next()
+            .map_or(0, |bent| bent["count"].as_u64().unwrap())
+    };
+    let free = |plan: &serde_json::Value| plan["free"].as_u64().unwrap();
+    for (plan, map, printed) in [&known, &unknown] {
+        assert_eq!(free(plan) + count(plan), free(&in_air.0));
+        assert!(map["rules"].list().iter().any(|rule| rule == "bent"));
+        holds(printed, ["bend: of the tip of the median needle", "/"]);
+        for route in plan["routes"].list() {
+            let bend = &route["bend"];
+            assert!(bend["tip_m"].number() > 1e-4, "{bend}");
+            for margin in bend["margins"].list() {
+                let kept = margin["distance_m"]
+                    .as_f64()
+                    .is_none_or(|m| m >= margin["margin_m"].number());
+                assert!(kept || bend["towards_in_phantom"].is_null(), "{bend}");
+            }
+        }
+    }
+    let towards =
+        |plan: &serde_json::Value| plan["routes"][0]["bend"]["towards_in_phantom"].clone();
+    // Its face looks to the feet.
+    assert!(numbers(&towards(&known.0))[2] > 0.5);
+    assert!(towards(&unknown.0).is_null());
+    // A bend to any side is part of the error that the margins are for.
+    assert_eq!(count(&unknown.0), 0);
+    assert!(count(&known.0) > 0);
+    holds(known.0["bent"]["reason"].word(), ["bent by", "asked for"]);
+    holds(&known.2, ["admissible for the straight needle alone"]);
+    // In air nothing of it is there.
+    assert!(in_air.0.get("bent").is_none() && in_air.0["routes"][0].get("bend").is_none());
+    assert!(in_air.1["rules"].list().iter().all(|rule| rule != "bent"));
+    assert!(!in_air.2.contains("bend"));
+}

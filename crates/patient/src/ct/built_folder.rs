@@ -255,6 +255,15 @@ impl BuiltFolder {
     /// The volume, if it is that of the report.
     ///
     /// # Errors
+    /// If there is another; interrupted.
+    pub fn volume_if_any(&self, cancel: &AtomicBool) -> Result<Option<Volume>, Stop> {
+        let is_there = self.folder.join(VOLUME_FILE).is_file();
+        is_there.then(|| self.volume(cancel)).transpose()
+    }
+
+    /// The volume.
+    ///
+    /// # Errors
     /// If there is none, or another; interrupted.
     pub fn volume(&self, cancel: &AtomicBool) -> Result<Volume, Stop> {
         let path = self.folder.join(VOLUME_FILE);

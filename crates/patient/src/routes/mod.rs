@@ -23,8 +23,8 @@ use needlebench_input::Finding;
 use needlebench_parallel::{Control, in_parallel};
 use needlebench_phantom::Phantom;
 use needlebench_routing::{
-    Anatomy, Route, RouteRules, Searched, SolidAnatomy, VoxelAnatomy, VoxelOptions, angles_rad,
-    apart, judge, outwards, refined, search,
+    Anatomy, Route, RouteNeedle, RouteRules, Searched, SolidAnatomy, VoxelAnatomy, VoxelOptions,
+    angles_rad, apart, judge, outwards, refined, search,
 };
 use needlebench_scenario::scenario::{GoalSection, RouteSection};
 use needlebench_scenario::{GoalPlacer, ResolvedScenario};
@@ -37,8 +37,8 @@ use joint::{Asked, Served, ask, best_asked};
 pub use freeing::free;
 pub use joint::AxisError;
 pub use report::{
-    ChosenRoute, ConfigurationAnswer, Freed, Freeing, MapColumns, MarginReport, RouteAnswer,
-    RoutePlan, RuleCount, WhyNot,
+    BendAnswer, BentRefusal, ChosenRoute, ConfigurationAnswer, Freed, Freeing, MapColumns,
+    MarginReport, RouteAnswer, RoutePlan, RuleCount, WhyNot,
 };
 
 /// Directions that are evaluated in voxels.
@@ -98,16 +98,35 @@ pub struct RouteTask<'a> {
 }
 
 impl RouteTask<'_> {
-    /// The rules in SI.
+    /// The rules in SI; without the needle's bend where its bevel is to face what is not there, see [`free_routes`].
     pub fn route_rules(&self) -> RouteRules {
-        RouteRules::new(
+        let rules = RouteRules::new(
             self.rules,
             &self.resolved.scenario.planning.needle_route,
             &self.resolved.cell.tool,
             self.section.standoff_mm * 1e-3,
             // A robot whose error nobody tells has the usual one.
             self.robot == WithRobot::Yes && self.resolved.expected.is_some(),
-        )
+        );
+        RouteRules {
+            needle: self.needle().ok().flatten(),
+            ..rules
+        }
+    }
+
+    /// The needle, if tissue bends it.
+    fn needle(&self) -> Result<Option<RouteNeedle>, Finding> {
+        let expected = self.resolved.expected.as_ref();
+        let Some(needle) = expected.and_then(|expected| expected.imperfections.tissue()) else {
+            return Ok(None);
+        };
+        let facing = GoalPlacer::new(self.resolved).bevel()?;
+        Ok(facing.map(|facing| RouteNeedle {
+            needle: needle.clone(),
+            facing,
+            standoff_m: self.section.standoff_mm * 1e-3,
+            insertion_length_m: self.section.insertion_length_mm.map(|mm| mm * 1e-3),
+        }))
     }
 
     /// Required number of feasible configurations.
@@ -127,13 +146,15 @@ impl RouteTask<'_> {
         }
     }
 
-    /// The voxels of a scan about the target.
+    /// The voxels of a scan about the target; Hounsfield units, in the order of the labels, tell fat from other soft
+    /// tissue on the way of a needle that bends.
     ///
     /// # Errors
     /// If the target is none, or is not in the scan's body; interrupted.
     pub fn voxels(
         &self,
         built: &BuiltFolder,
+        hu: Option<&[i16]>,
         control: &Control<'_>,
     ) -> Result<VoxelAnatomy, VoxelsError> {
         let target = GoalPlacer::new(self.resolved).target(self.section)?;
@@ -157,6 +178,7 @@ impl RouteTask<'_> {
             lung_vessel_m: self.rules.lung_vessel_mm * 1e-3,
             below_rib_m: self.rules.below_rib_mm * 1e-3,
             beside_sternum_m: self.rules.beside_sternum_mm * 1e-3,
+            hu: hu.filter(|_| rules.needle.is_some()),
             threads: control.threads,
             cancel: control.cancel,
         };
@@ -168,7 +190,6 @@ impl RouteTask<'_> {
         )?)
     }
 
-    /// The patient.
     /// The patient.
     ///
     /// # Errors
@@ -257,12 +278,13 @@ pub fn plan_routes(
 /// The first stage of [`plan_routes`].
 ///
 /// # Errors
-/// If it was interrupted.
+/// If the bevel is to face a structure that the patient does not have, or it was interrupted.
 pub fn free_routes(
     task: &RouteTask<'_>,
     anatomy: &dyn Anatomy,
     control: &Control<'_>,
 ) -> Result<FreeRoutes, SuggestError> {
+    task.needle()?;
     let rules = task.route_rules();
     control.progress.message("routes");
     let stop = || control.is_cancelled();

@@ -1,8 +1,11 @@
 //! What was found, as a document.
 
+use nalgebra::UnitVector3;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_numerics::pareto::pareto_front;
-use needlebench_routing::{Anatomy, Nearest, Obstacle, Ray, Risk, RouteRule, RouteRules, Searched};
+use needlebench_routing::{
+    Anatomy, Nearest, Obstacle, Ray, Risk, RouteRule, RouteRules, Searched, bent_reason,
+};
 use serde::Serialize;
 
 use super::joint::{Asked, AxisError, ROLLS, Served};
@@ -52,11 +55,25 @@ pub struct RoutePlan {
     pub chosen: Option<ChosenRoute>,
     /// What nothing beats in risk, clearance, expected error and room at once: number of a route and a configuration.
     pub pareto: Vec<(usize, &'static str)>,
+    /// The best path that only the bent needle breaks a rule on; none if there is none, or no needle is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bent: Option<BentRefusal>,
     /// The best path if it is infeasible for the robot.
     pub why_not: Option<WhyNot>,
     /// Every direction that was evaluated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<MapColumns>,
+}
+
+/// A path that is admissible for the straight needle, and not for the one that tissue bends.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BentRefusal {
+    /// Azimuth and elevation from the target, deg.
+    pub direction_deg: [f64; 2],
+    /// How it compares: [`Risk::odds_ratio`].
+    pub odds_ratio: f64,
+    /// What the bent needle comes too close to, for people.
+    pub reason: String,
 }
 
 /// A margin without the robot's own error.
@@ -96,6 +113,9 @@ pub struct RouteAnswer {
     pub angle_to_skin_normal_rad: f64,
     /// What the needle keeps from bone, vessels and organs.
     pub margins: Vec<MarginReport>,
+    /// The same of the median needle as tissue bends it, with the same margins; none where no needle is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bend: Option<BendAnswer>,
     /// How often it enters a lung.
     pub pleural_crossings: u32,
     /// How much of it is in a lung.
@@ -129,6 +149,18 @@ pub struct MarginReport {
     pub distance_m: Option<f64>,
     /// The required distance without the robot's own error.
     pub margin_m: f64,
+}
+
+/// A needle as tissue bends it on a route.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BendAnswer {
+    /// How far the tip is off the axis, m.
+    pub tip_m: f64,
+    /// Unit vector towards which it bends, frame `phantom`; none where that is not known, and distances are the least
+    /// of twelve directions.
+    pub towards_in_phantom: Option<[f64; 3]>,
+    /// What the bent needle keeps from bone, vessels and organs.
+    pub margins: Vec<MarginReport>,
 }
 
 /// One configuration on a route.
@@ -241,15 +273,13 @@ fn short(value: f64) -> f64 {
 }
 
 impl MapColumns {
-    pub(super) fn of(searched: &Searched) -> Self {
+    /// Without a needle that bends there is no rule about it.
+    pub(super) fn of(searched: &Searched, bends: bool) -> Self {
         let all = &searched.candidates;
         let angle = |index: usize| {
-            all.iter()
-                .map(|each| {
-                    let degrees =
-                        needlebench_routing::angles_rad(&each.outwards)[index].to_degrees();
-                    (degrees * 100.0).round() / 100.0 + 0.0
-                })
+            let directions = all.iter();
+            directions
+                .map(|each| direction_deg(&each.outwards)[index])
                 .collect()
         };
         let refusal = |value: &dyn Fn(&needlebench_routing::Refusal) -> f64| {
@@ -258,9 +288,13 @@ impl MapColumns {
                 .map(|refusal| refusal.map(value).and_then(finite).map(short))
                 .collect()
         };
-        let rule = |rule: RouteRule| RouteRule::ALL.iter().position(|each| *each == rule);
+        let rules = RouteRule::ALL.into_iter();
+        let rules: Vec<RouteRule> = rules
+            .filter(|each| bends || *each != RouteRule::Bent)
+            .collect();
+        let rule = |rule: RouteRule| rules.iter().position(|each| *each == rule);
         Self {
-            rules: RouteRule::ALL.map(RouteRule::name).into(),
+            rules: rules.iter().map(|each| each.name()).collect(),
             azimuth_deg: angle(0),
             elevation_deg: angle(1),
             depth_m: all.iter().map(|each| each.depth_m.map(short)).collect(),
@@ -351,8 +385,31 @@ pub(super) fn plan(
             .iter()
             .map(|each| answer(anatomy, rules, each))
             .collect(),
-        map: Some(MapColumns::of(searched)),
+        bent: best_bent(anatomy, rules, searched),
+        map: Some(MapColumns::of(searched, rules.needle.is_some())),
     }
+}
+
+/// The best path that only the bent needle is refused on.
+fn best_bent(
+    anatomy: &dyn Anatomy,
+    rules: &RouteRules,
+    searched: &Searched,
+) -> Option<BentRefusal> {
+    let refused = searched.candidates.iter();
+    let refused = refused.filter_map(|candidate| candidate.straight.as_deref());
+    let best = refused.min_by(|a, b| a.better_first(b))?;
+    Some(BentRefusal {
+        direction_deg: direction_deg(&best.outwards),
+        odds_ratio: best.risk.odds_ratio,
+        reason: bent_reason(anatomy, rules, best)?,
+    })
+}
+
+/// Azimuth and elevation as they are written, deg.
+fn direction_deg(outwards: &UnitVector3<f64>) -> [f64; 2] {
+    needlebench_routing::angles_rad(outwards)
+        .map(|angle| (angle.to_degrees() * 100.0).round() / 100.0 + 0.0)
 }
 
 /// Why configurations do not work, the most frequent reason first.
@@ -398,15 +455,27 @@ fn answer(anatomy: &dyn Anatomy, rules: &RouteRules, asked: &Asked) -> RouteAnsw
         outwards: route.outwards,
     };
     let entry = ray.at(route.depth_m);
-    let margins = Obstacle::ALL.into_iter().map(|obstacle| {
-        let span = [-rules.throw_m, route.depth_m];
-        let nearest: Option<Nearest> = anatomy.nearest(&ray, span, obstacle);
-        MarginReport {
+    let margin =
+        |obstacle: Obstacle, nearest: Option<Nearest>, distances_m: &[f64; 3]| MarginReport {
             obstacle: obstacle.name(),
             part: nearest.map(|nearest| nearest.name),
-            distance_m: finite(route.distances_m[obstacle as usize]),
+            distance_m: finite(distances_m[obstacle as usize]),
             margin_m: rules.margins_m[obstacle as usize],
-        }
+        };
+    let margins = Obstacle::ALL.into_iter().map(|obstacle| {
+        let span = [-rules.throw_m, route.depth_m];
+        let nearest = anatomy.nearest(&ray, span, obstacle);
+        margin(obstacle, nearest, &route.distances_m)
+    });
+    let needle = rules.needle.as_ref();
+    let to_any_side = || needle?.bend(anatomy, &ray, route.depth_m, rules.throw_m);
+    let bend = route.bend.clone().or_else(to_any_side);
+    let bend = bend.as_ref().map(|bend| BendAnswer {
+        tip_m: bend.tip_m,
+        towards_in_phantom: bend.towards.map(Into::into),
+        margins: Obstacle::ALL
+            .map(|each| margin(each, bend.nearest(anatomy, &ray, each), &bend.distances_m))
+            .into(),
     });
     let [azimuth, elevation] = direction_deg;
     let mm = entry.coords * 1e3;
@@ -423,6 +492,7 @@ fn answer(anatomy: &dyn Anatomy, rules: &RouteRules, asked: &Asked) -> RouteAnsw
         depth_m: route.depth_m,
         angle_to_skin_normal_rad: route.skin_angle_rad,
         margins: margins.collect(),
+        bend,
         pleural_crossings: route.lungs.entries,
         depth_in_lung_m: route.lungs.within_m,
         fissures_crossed: route.lungs.fissures.clone(),

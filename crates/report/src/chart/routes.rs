@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::skin_map::{HIGHEST_DEG, numbered, skin_panel};
 
 /// Colours of rules, told apart by lightness too.
-const RULES: [(&str, &str, Rgb); 12] = [
+const RULES: [(&str, &str, Rgb); 13] = [
     ("needle_too_short", "needle too short", [226, 226, 226]),
     ("outside", "arm, couch or marker", [120, 120, 120]),
     ("end_of_body", "skin unknown", [176, 190, 220]),
@@ -21,6 +21,7 @@ const RULES: [(&str, &str, Rgb); 12] = [
     ("fissure", "fissure", [200, 150, 210]),
     ("bulla", "bulla", [225, 190, 235]),
     ("throw", "throw blocked", [240, 196, 70]),
+    ("bent", "bent needle too close", [70, 110, 190]),
     ("no_skin", "no skin", [245, 245, 245]),
 ];
 

@@ -9,13 +9,14 @@ use needlebench_show::chart::{
 use super::skin_map::{HIGHEST_DEG, MARK_PX, numbered, skin_panel};
 
 /// Colours of rules, told apart by lightness too.
-const RULES: [(EntryRule, Rgb); 8] = [
+const RULES: [(EntryRule, Rgb); 9] = [
     (EntryRule::NeedleTooShort, [226, 226, 226]),
     (EntryRule::Blocked, [120, 120, 120]),
     (EntryRule::End, [176, 190, 220]),
     (EntryRule::Oblique, [206, 214, 235]),
     (EntryRule::Bone, [150, 110, 60]),
     (EntryRule::Vessel, [196, 44, 52]),
+    (EntryRule::Bent, [70, 110, 190]),
     (EntryRule::Organ, [238, 170, 150]),
     (EntryRule::Robot, [240, 196, 70]),
 ];

@@ -4,11 +4,17 @@ use std::fmt::Write;
 
 use needlebench_cell::{part_in_words, reason_in_words};
 use needlebench_patient::Refused;
-use needlebench_patient::routes::{ConfigurationAnswer, RouteAnswer, RoutePlan, SAME_ODDS, WhyNot};
+use needlebench_patient::routes::{
+    ConfigurationAnswer, MarginReport, RouteAnswer, RoutePlan, SAME_ODDS, WhyNot,
+};
 use needlebench_show::plain_table;
 
 /// Needle paths of the table.
 const SHOWN: usize = 8;
+
+/// What tables have of a needle that bends, for people.
+pub(super) const BEND_TERMS: &str = "bend: of the tip of the median needle in tissue; behind the slash the clearance \
+     of the needle so bent, where the direction of its bevel is not known the least of twelve";
 
 /// Needle paths to a target.
 pub fn routes_text(plan: &RoutePlan) -> String {
@@ -42,11 +48,23 @@ pub fn routes_text(plan: &RoutePlan) -> String {
     if let Some(why_not) = &plan.why_not {
         let _ = writeln!(text, "{}", refused_route(why_not));
     }
+    if let Some(bent) = &plan.bent {
+        let [azimuth, elevation] = bent.direction_deg;
+        let _ = writeln!(
+            text,
+            "admissible for the straight needle alone: {azimuth:.0}, {elevation:.0} deg, odds {:.2}; {}",
+            bent.odds_ratio, bent.reason
+        );
+    }
     let _ = writeln!(text, "\n{}", table(plan));
     text.push_str(
         "odds: product of published pneumothorax odds ratios relative to a path without risk \
          factors; for ranking only, not a probability\nbone, vessel, organ: lower bounds of the needle clearance",
     );
+    if plan.routes.iter().any(|route| route.bend.is_some()) {
+        text.push('\n');
+        text.push_str(BEND_TERMS);
+    }
     if plan.margins.iter().any(|margin| !margin.known) {
         text.push_str("\n?: no such structure labelled in this patient");
     }
@@ -199,6 +217,10 @@ fn table(plan: &RoutePlan) -> String {
         "vessel\n(mm)",
         "organ\n(mm)",
     ];
+    let bends = plan.routes.iter().any(|route| route.bend.is_some());
+    if bends {
+        header.insert(5, "bend\n(mm)");
+    }
     let with_robot = plan.robot_not_asked.is_none();
     if with_robot {
         header.extend([
@@ -226,14 +248,21 @@ fn table(plan: &RoutePlan) -> String {
             format!("{:.0}", route.depth_in_lung_m * 1e3),
             format!("{:.2}", route.risk.odds_ratio),
         ];
-        for (margin, base) in route.margins.iter().zip(&plan.margins) {
-            if !base.known {
-                row.push("?".to_owned());
-                continue;
-            }
-            // Fields end at 20 mm: what is told there is no distance.
-            let told = margin.distance_m.filter(|_| margin.part.is_some());
-            row.push(told.map_or_else(|| "far".to_owned(), mm));
+        if let Some(bend) = &route.bend {
+            row.push(mm(bend.tip_m.abs()));
+        }
+        // Fields end at 20 mm: what is told there is no distance.
+        let told = |margin: &MarginReport| {
+            let near = margin.distance_m.filter(|_| margin.part.is_some());
+            near.map_or_else(|| "far".to_owned(), mm)
+        };
+        for (index, (margin, base)) in route.margins.iter().zip(&plan.margins).enumerate() {
+            let bent = route.bend.as_ref().map(|bend| told(&bend.margins[index]));
+            row.push(match bent {
+                _ if !base.known => "?".to_owned(),
+                Some(bent) => format!("{}/{bent}", told(margin)),
+                None => told(margin),
+            });
         }
         if with_robot {
             let best = best(route);

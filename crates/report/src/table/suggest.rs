@@ -3,11 +3,15 @@
 use std::fmt::Write;
 
 use needlebench_bench::preview::ConfigurationPreview;
-use needlebench_bench::suggest::{ENTRY_TERMS, Entry, EntryRule, EntrySearch, PlaceSearch};
+use needlebench_bench::suggest::{
+    ENTRY_TERMS, Entry, EntryRule, EntrySearch, PlaceSearch, TissueMargin,
+};
 use needlebench_patient::Refused;
 
 use needlebench_cell::{part_in_words, reason_in_words};
 use needlebench_show::plain_table;
+
+use super::routes::BEND_TERMS;
 
 /// Entries for a target.
 pub fn entries_text(found: &EntrySearch) -> String {
@@ -43,6 +47,10 @@ pub fn entries_text(found: &EntrySearch) -> String {
         .map(|tissue| format!("{tissue}\n(mm)"))
         .collect();
     header.extend(headings.iter().map(String::as_str));
+    let bends = found.entries.iter().any(|entry| entry.bent.is_some());
+    if bends {
+        header.insert(4, "bend\n(mm)");
+    }
     header.extend(["feasible", "score\nof 100"]);
     let is_planned = found
         .entries
@@ -56,6 +64,10 @@ pub fn entries_text(found: &EntrySearch) -> String {
         table.add_row(entry_row(index, entry, &tissues, is_planned));
     }
     let _ = writeln!(text, "{table}\n{ENTRY_TERMS}");
+    if bends {
+        text.push_str(BEND_TERMS);
+        text.push('\n');
+    }
     for (index, entry) in found.entries.iter().enumerate() {
         let nearest = entry.margins.iter().map(|each| part_in_words(&each.part));
         let nearest: Vec<_> = nearest.collect();
@@ -86,12 +98,22 @@ fn entry_row(index: usize, entry: &Entry, tissues: &[&str], is_planned: bool) ->
         format!("{:.0}", entry.depth_m * 1e3),
         format!("{:.0}", entry.angle_to_skin_normal_rad.to_degrees()),
     ];
+    if let Some(bent) = &entry.bent {
+        row.push(format!("{:.1}", bent.bend_m.abs() * 1e3));
+    }
     for tissue in tissues {
-        let margin = entry.margins.iter().find(|each| each.tissue == *tissue);
-        row.push(margin.map_or_else(
-            || "-".to_owned(),
-            |each| format!("{:.1}", each.distance_m * 1e3),
-        ));
+        let clearance = |margins: &[TissueMargin]| {
+            let margin = margins.iter().find(|each| each.tissue == *tissue);
+            margin.map_or_else(
+                || "-".to_owned(),
+                |each| format!("{:.1}", each.distance_m * 1e3),
+            )
+        };
+        let straight = clearance(&entry.margins);
+        row.push(match &entry.bent {
+            Some(bent) => format!("{straight}/{}", clearance(&bent.bent_margins)),
+            None => straight,
+        });
     }
     row.push(format!("{} of 8", entry.working));
     if is_planned {

@@ -1,10 +1,15 @@
 //! What labels mean for a needle.
 
 use needlebench_imaging::Label;
+use needlebench_phantom::Passed;
 use needlebench_volume::{LabelMap, SurfaceTissue, structure_of};
 
 use super::blocks::BodySide;
 use crate::Obstacle;
+
+/// Words of fat in the names of labels, and of muscles.
+const FAT: [&str; 2] = ["fat", "adipose"];
+const MUSCLE: [&str; 4] = ["muscle", "autochthon", "iliopsoas", "gluteus"];
 
 /// What a voxel is to a needle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +56,41 @@ impl Class {
             kind,
             mark: Mark::None,
         }
+    }
+
+    /// What a needle in it is in; none for bone, whose tissue nobody knows.
+    pub fn passed(&self) -> Option<Passed> {
+        let lower = self.name.to_lowercase();
+        let is_called = |words: &[&str]| words.iter().any(|word| lower.contains(word));
+        match self.kind {
+            Kind::Bone => None,
+            Kind::Lesion => Some(Passed::Lesion),
+            Kind::InLung if self.mark == Mark::Bulla => Some(Passed::Gas),
+            Kind::Lung(_) | Kind::InLung => Some(Passed::Lung),
+            _ if self.mark == Mark::Gas || is_called(&["pneumothorax"]) => Some(Passed::Gas),
+            _ if is_called(&["effusion", "fluid"]) => Some(Passed::Fluid),
+            Kind::Soft if is_called(&FAT) => Some(Passed::Fat),
+            // What may be passed by the scenario is bone all the same.
+            Kind::Soft => (self.tissue() != Some(SurfaceTissue::Bone)).then_some(Passed::Wall),
+            Kind::Organ if self.is_airway() => Some(Passed::Gas),
+            _ => Some(Passed::Wall),
+        }
+    }
+
+    /// Whether only Hounsfield units tell what of it is fat: its name says no more than that it is soft.
+    pub fn may_be_fat(&self) -> bool {
+        let lower = self.name.to_lowercase();
+        let is_named = FAT.iter().chain(&MUSCLE).any(|word| lower.contains(word));
+        let is_skin_or_unknown = matches!(self.tissue(), None | Some(SurfaceTissue::Skin));
+        self.kind == Kind::Soft && !is_named && is_skin_or_unknown
+    }
+
+    fn tissue(&self) -> Option<SurfaceTissue> {
+        structure_of(&self.name).map(|structure| structure.tissue)
+    }
+
+    fn is_airway(&self) -> bool {
+        structure_of(&self.name).is_some_and(|structure| structure.name == "trachea")
     }
 
     /// Whether it counts as an obstacle for a target in a lung.

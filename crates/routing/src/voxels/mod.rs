@@ -14,7 +14,7 @@ use nalgebra::{Point3, Vector3};
 use needlebench_imaging::{
     Components, Connectivity, DistanceField, DistanceOptions, IndexBox, Label, Mask, opened,
 };
-use needlebench_phantom::Phantom;
+use needlebench_phantom::{Passed, Phantom};
 use needlebench_scenario::scenario::NeedleRouteSection;
 use needlebench_volume::{LabelMap, Remark, VolumeError, VoxelGrid, structure_of};
 
@@ -29,6 +29,9 @@ const CAP_M: f64 = 20e-3;
 
 /// Least pocket of gas that is bowel or airway, m^3: half a millilitre (assumed). Noise under the skin makes smaller ones.
 const GAS_M3: f64 = 0.5e-6;
+
+/// Soft tissue below this is fat, HU (assumed: fat is about -100, muscle 50).
+const FAT_BELOW_HU: i16 = -30;
 
 /// Share of a lesion's surface that has to be against lung for the lesion to be in it: one at the wall has half of it.
 const IN_LUNG: f64 = 0.3;
@@ -77,6 +80,8 @@ pub struct VoxelOptions<'a> {
     pub below_rib_m: f64,
     /// How far from the sternum's edges internal mammary vessels are modelled, m.
     pub beside_sternum_m: f64,
+    /// Hounsfield units of the label map's voxels, which tell fat from other soft tissue; without, names of labels do.
+    pub hu: Option<&'a [i16]>,
     /// Threads to use; nothing depends on it.
     pub threads: usize,
     /// Set by another thread to give up.
@@ -100,6 +105,9 @@ pub struct VoxelAnatomy {
     voxels: Vec<u8>,
     blocks: Blocks,
     classes: Classes,
+    /// What a needle in each class is in.
+    passed: Vec<Option<Passed>>,
+    is_fat_known: bool,
     /// In the order of [`Obstacle::ALL`]; none where there is nothing.
     fields: [Option<DistanceField>; 3],
     target: Point3<f64>,
@@ -120,7 +128,8 @@ impl VoxelAnatomy {
     /// grid's run along them.
     ///
     /// # Errors
-    /// A grid that is not along the axes of `ct`, a target outside them or outside the body, interrupted.
+    /// A grid that is not along the axes of `ct`, Hounsfield units of other voxels, a target outside them or outside
+    /// the body, interrupted.
     pub fn new(
         labels: &LabelMap,
         origin_in_ct_m: Vector3<f64>,
@@ -131,6 +140,11 @@ impl VoxelAnatomy {
         if !grid.is_aligned() {
             return Err(VolumeError::refused(
                 "the label map's axes do not run to the left, the back and the head",
+            ));
+        }
+        if options.hu.is_some_and(|hu| hu.len() != labels.labels.len()) {
+            return Err(VolumeError::refused(
+                "the Hounsfield units are of other voxels than the labels",
             ));
         }
         let spacing_m = grid.spacing_m();
@@ -146,9 +160,16 @@ impl VoxelAnatomy {
             last: centre,
         }
         .widened(reach, grid.size());
-        let classes = Classes::of(labels, options.lesions, options.off);
-        let voxels = boxed(&labels.labels, grid.size(), &within, |label| {
-            classes.of_label(label)
+        let mut classes = Classes::of(labels, options.lesions, options.off);
+        let fat = options
+            .hu
+            .map(|_| classes.add(Class::new("fat", Kind::Soft)));
+        let may_be_fat: Vec<bool> = classes.all().map(Class::may_be_fat).collect();
+        let voxels = boxed(grid.size(), &within, |offset| {
+            let class = classes.of_label(labels.labels[offset]);
+            let is_fat = |hu: &[i16]| may_be_fat[usize::from(class)] && hu[offset] < FAT_BELOW_HU;
+            let split = fat.filter(|_| options.hu.is_some_and(is_fat));
+            split.unwrap_or(class)
         });
         let blocks = Blocks::of(
             &voxels,
@@ -165,6 +186,8 @@ impl VoxelAnatomy {
             voxels,
             blocks,
             classes,
+            passed: Vec::new(),
+            is_fat_known: false,
             fields: [None, None, None],
             target,
             target_lung: None,
@@ -192,6 +215,10 @@ impl VoxelAnatomy {
                 "the target is not in a lung: needle paths avoid both lungs",
             ));
         }
+        anatomy.passed = anatomy.classes.all().map(Class::passed).collect();
+        let is_labelled = |name: &str| Class::new(name, Kind::Soft).passed() == Some(Passed::Fat);
+        anatomy.is_fat_known =
+            options.hu.is_some() || labels.names.iter().any(|(_, name)| is_labelled(name));
         anatomy.make_fields(options)?;
         Ok(anatomy)
     }
@@ -557,19 +584,13 @@ fn voxel_at(index: &Point3<f64>, size: [usize; 3]) -> Option<[usize; 3]> {
     Some(voxel)
 }
 
-/// Classes of a box of voxels.
-fn boxed(
-    labels: &[u16],
-    [nx, ny, _]: [usize; 3],
-    within: &IndexBox,
-    class: impl Fn(u16) -> u8,
-) -> Vec<u8> {
+/// Classes of a box of voxels, by their offsets.
+fn boxed([nx, ny, _]: [usize; 3], within: &IndexBox, class: impl Fn(usize) -> u8) -> Vec<u8> {
     let mut out = Vec::with_capacity(within.size().iter().product());
     for k in within.first[2]..=within.last[2] {
         for j in within.first[1]..=within.last[1] {
             let row = (k * ny + j) * nx;
-            let row = &labels[row + within.first[0]..=row + within.last[0]];
-            out.extend(row.iter().map(|&label| class(label)));
+            out.extend((row + within.first[0]..=row + within.last[0]).map(&class));
         }
     }
     out

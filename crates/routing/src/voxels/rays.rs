@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_imaging::DistanceField;
-use needlebench_phantom::Phantom;
+use needlebench_phantom::{LayersError, PassedLayer, Phantom};
 
 use super::blocks::{BLOCK, BodySide};
 use super::classes::{Kind, Mark};
@@ -415,6 +415,26 @@ impl Anatomy for VoxelAnatomy {
             angle_rad(&ray.outwards, &normal)
         });
         passage
+    }
+
+    fn layers(&self, ray: &Ray, from_to_m: [f64; 2]) -> Result<Vec<PassedLayer>, LayersError> {
+        let (mut inwards, mut bone) = (Vec::new(), None);
+        self.walk(ray, from_to_m, |class, [enters_m, leaves_m]| {
+            let tissue = self.passed[usize::from(class)];
+            inwards.extend(tissue.map(|tissue| PassedLayer {
+                tissue,
+                length_m: leaves_m - enters_m,
+            }));
+            bone = tissue.is_none().then(|| &self.classes.get(class).name);
+            bone.is_none()
+        });
+        match bone {
+            Some(name) => Err(LayersError::Bone(name.clone())),
+            None => Ok(PassedLayer::layers(
+                inwards.into_iter().rev(),
+                self.is_fat_known,
+            )),
+        }
     }
 
     fn leaves_lung_m(&self, ray: &Ray, within_m: f64) -> Option<f64> {

@@ -1,5 +1,7 @@
 //! Routes in voxels and among solids, against brute force.
 
+mod bent;
+mod layers;
 mod normals;
 mod solids;
 mod voxels;

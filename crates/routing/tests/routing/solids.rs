@@ -5,7 +5,7 @@ use needlebench_phantom::{Phantom, PhantomPart, Tissue};
 use needlebench_routing::{Obstacle, Ray, RouteRule, RouteRules, SolidAnatomy, search};
 use needlebench_scenario::scenario::{NeedleRouteSection, OddsSection};
 
-fn rules() -> RouteRules {
+pub(crate) fn rules() -> RouteRules {
     RouteRules {
         margins_m: [2.7e-3; 3],
         constant_m: 1e-3,
@@ -20,6 +20,7 @@ fn rules() -> RouteRules {
         cross_bullae: false,
         throw_m: 0.01,
         odds: OddsSection::default(),
+        needle: None,
     }
 }
 
@@ -27,7 +28,7 @@ fn phantom() -> Phantom {
     Phantom::build(&Phantom::size_preset("male-p50-supine").unwrap()).unwrap()
 }
 
-fn counts(part: &PhantomPart, own: Option<&str>) -> Option<Obstacle> {
+pub(crate) fn counts(part: &PhantomPart, own: Option<&str>) -> Option<Obstacle> {
     if part.organ.as_deref() == own && own.is_some() {
         return None;
     }

@@ -25,7 +25,7 @@ const NODULE: u16 = 100;
 const UPPER: u16 = 30;
 
 /// A chest of ellipsoids, with ribs, a heart, vessels, and a nodule; optionally with the lung in two lobes.
-fn chest(with_lobes: bool) -> LabelMap {
+pub(crate) fn chest(with_lobes: bool) -> LabelMap {
     let grid = VoxelGrid::aligned(SIZE, SPACING_M, Point3::new(-0.09, -0.07, 0.02)).unwrap();
     let mut labels = vec![0_u16; grid.len()];
     for k in 0..SIZE[2] {
@@ -95,7 +95,7 @@ fn label_at(at: &Point3<f64>, with_lobes: bool) -> u16 {
     SOFT
 }
 
-fn rules() -> RouteRules {
+pub(crate) fn rules() -> RouteRules {
     RouteRules {
         margins_m: [2e-3, 2.5e-3, 2.7e-3],
         constant_m: 1e-3,
@@ -110,11 +110,12 @@ fn rules() -> RouteRules {
         cross_bullae: false,
         throw_m: 0.008,
         odds: OddsSection::default(),
+        needle: None,
     }
 }
 
 /// Options about a target without a lesion, with what is modelled beside bone.
-fn usual() -> VoxelOptions<'static> {
+pub(crate) fn usual() -> VoxelOptions<'static> {
     VoxelOptions {
         patient: None,
         lesions: &[],
@@ -125,12 +126,13 @@ fn usual() -> VoxelOptions<'static> {
         lung_vessel_m: 0.0,
         below_rib_m: 3e-3,
         beside_sternum_m: 20e-3,
+        hu: None,
         threads: 1,
         cancel: &GO,
     }
 }
 
-fn anatomy(labels: &LabelMap, threads: usize) -> VoxelAnatomy {
+pub(crate) fn anatomy(labels: &LabelMap, threads: usize) -> VoxelAnatomy {
     VoxelAnatomy::new(
         labels,
         Vector3::zeros(),
@@ -150,7 +152,7 @@ fn anatomy(labels: &LabelMap, threads: usize) -> VoxelAnatomy {
 }
 
 /// Middles of the voxels of an obstacle.
-fn boxes_of(labels: &LabelMap, obstacle: Obstacle) -> Vec<Point3<f64>> {
+pub(crate) fn boxes_of(labels: &LabelMap, obstacle: Obstacle) -> Vec<Point3<f64>> {
     let mut boxes = Vec::new();
     for k in 0..SIZE[2] {
         for j in 0..SIZE[1] {
@@ -166,7 +168,7 @@ fn boxes_of(labels: &LabelMap, obstacle: Obstacle) -> Vec<Point3<f64>> {
 }
 
 /// Least distance of a stretch of a ray's axis from boxes of voxels: in steps of 0.2 mm, each with all of them.
-fn brute_m(boxes: &[Point3<f64>], ray: &Ray, [from_m, to_m]: [f64; 2]) -> f64 {
+pub(crate) fn brute_m(boxes: &[Point3<f64>], ray: &Ray, [from_m, to_m]: [f64; 2]) -> f64 {
     let half = Vector3::from(SPACING_M) * 0.5;
     let (count, mut least_m) = (((to_m - from_m) / 2e-4).ceil(), f64::INFINITY);
     let mut step = 0.0;

@@ -7,7 +7,9 @@ use nalgebra::Point3;
 use needlebench_cell::{BodyKind, CollisionBody, Frame};
 use needlebench_input::TomlText;
 
-use super::goals::{BodyBoxes, Goal, Surroundings, resolve_goal, target_inside};
+use super::goals::{
+    BevelFacing, BodyBoxes, Goal, Surroundings, bevel_facing, resolve_goal, target_inside,
+};
 use super::{Finding, ResolvedScenario};
 use crate::scenario::GoalSection;
 
@@ -195,6 +197,18 @@ impl<'a> GoalPlacer<'a> {
                 .hint("give it a `lesion` or `target_mm` instead"));
         }
         target_inside(&toml, &key, section, &placed.phantom).map(|(target, _)| target)
+    }
+
+    /// Where the bevel of a needle that bends in tissue looks; none without such a needle or a patient.
+    ///
+    /// # Errors
+    /// A structure that the patient does not have.
+    pub fn bevel(&self) -> Result<Option<BevelFacing>, Finding> {
+        let toml = TomlText::without_text(&self.resolved.source.file);
+        let needle = self.resolved.scenario.needle_in_tissue();
+        let both = needle.zip(self.resolved.phantom.as_ref());
+        both.map(|((place, block), placed)| bevel_facing(&toml, place, block, &placed.phantom))
+            .transpose()
     }
 
     /// The goal in the world.

@@ -223,7 +223,7 @@ class EntryMap {
 
   /** @param {string} rule @param {number | null} value @param {number | null} limit */
   found(rule, value, limit) {
-    if (value === null || !['bone', 'vessel', 'organ', 'throw', 'needle_too_short'].includes(rule)) return '';
+    if (value === null || !['bone', 'vessel', 'organ', 'throw', 'bent', 'needle_too_short'].includes(rule)) return '';
     return rule === 'needle_too_short'
       ? `, ${NB.mm(value)} mm, needle reach ${NB.mm(limit)} mm`
       : `, ${NB.mm(value)} mm, ${NB.mm(limit)} mm required`;
@@ -444,9 +444,9 @@ class EntryMap {
     /** @param {{ route: PlannedRoute }} row */
     const best = ({ route }) => route.configurations.find(({ label }) => label === route.best);
     const asked = plan.routes.some(({ configurations }) => configurations.length);
-    /** @param {PlannedRoute} route */
-    const nearest = (route) => {
-      const known = route.margins.flatMap(({ part, distance_m, obstacle }) =>
+    /** @param {PlannedRoute['margins']} margins */
+    const nearest = (margins) => {
+      const known = margins.flatMap(({ part, distance_m, obstacle }) =>
         part === null || distance_m === null ? [] : [{ distance_m, obstacle }],
       );
       const [least] = known.sort((a, b) => a.distance_m - b.distance_m);
@@ -469,8 +469,14 @@ class EntryMap {
       },
       { title: 'Depth', unit: 'mm', numeric: true, cell: ({ route }) => NB.mm(route.depth_m, 0) },
       { title: 'Odds ratio', numeric: true, cell: ({ route }) => NB.fixed(route.risk.odds_ratio, 2) },
-      { title: 'Nearest structure', unit: 'mm', cell: ({ route }) => nearest(route) },
+      { title: 'Nearest structure', unit: 'mm', cell: ({ route }) => nearest(route.margins) },
     ];
+    const bend = plan.routes.find((route) => route.bend)?.bend;
+    if (bend)
+      columns.push(
+        { title: 'Bend', unit: 'mm', numeric: true, cell: ({ route }) => NB.mm(Math.abs(route.bend?.tip_m ?? NaN)) },
+        { title: 'Nearest, bent', unit: 'mm', cell: ({ route }) => (route.bend ? nearest(route.bend.margins) : '') },
+      );
     if (asked) {
       columns.push(
         { title: 'Feasible in', unit: 'of 8', numeric: true, cell: ({ route }) => String(route.working) },
@@ -497,7 +503,12 @@ class EntryMap {
         class: 'soft',
         text:
           'Odds ratio: pneumothorax, relative to a path without risk factors; for ranking only, not a probability. ' +
-          'Nearest structure: lower bound of the needle\u2019s distance from bone, vessels and organs. Feasible in: ' +
+          'Nearest structure: lower bound of the needle\u2019s distance from bone, vessels and organs. ' +
+          (bend
+            ? 'Bend: of the median needle\u2019s tip in tissue; nearest, bent: that of the needle so bent' +
+              `${bend.towards_in_phantom ? '' : ', the least of twelve directions of its bend'}. `
+            : '') +
+          'Feasible in: ' +
           'configurations that satisfy all limits and, with their own tip error, the required clearances of the ' +
           'path. Clearance, lateral error (RMS) and free space are those of the best configuration; postures only, ' +
           'motions not planned. Free space: share of the hemisphere of 0.35 m about the entry that arm and tool ' +

@@ -30,8 +30,9 @@ PLAN.routeRows = (columns, caption) => {
       return NB.el('span', {
         class: 'bad',
         text:
-          `${judged.broken}: ${value(judged.value)}, ${value(judged.limit)} ` +
-          `${judged.is_least ? 'required' : 'allowed'}${unseen}`,
+          (judged.bent ??
+            `${judged.broken}: ${value(judged.value)}, ${value(judged.limit)} ` +
+              `${judged.is_least ? 'required' : 'allowed'}`) + unseen,
       });
     });
   }

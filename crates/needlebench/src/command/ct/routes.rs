@@ -375,7 +375,7 @@ fn find(
     let file = patient.resolved.source.file.clone();
     let stop = |error: SuggestError| error.in_file(&file);
     let folder = patient.scenario.parent().unwrap_or(Path::new(""));
-    let (mut plans, mut remarks) = (Vec::new(), Vec::new());
+    let (mut plans, mut remarks, mut volume) = (Vec::new(), Vec::new(), None);
     for section in patient.sections(arguments)? {
         let rules = section.route.clone().unwrap_or_default();
         let in_voxels = patient.built.is_some();
@@ -393,10 +393,16 @@ fn find(
         };
         let mut plan = if let Some(built) = &patient.built {
             control.progress.message("distances");
-            let anatomy = task.voxels(built, control).map_err(|error| match error {
-                VoxelsError::Scan(error) => Stop::of_scan(&patient.scenario, error),
-                VoxelsError::Target(finding) => finding.into(),
-            })?;
+            if task.route_rules().needle.is_some() && volume.is_none() {
+                volume = built.volume_if_any(control.cancel)?;
+            }
+            let hu = volume.as_ref().map(|volume| volume.hu.as_slice());
+            let anatomy = task
+                .voxels(built, hu, control)
+                .map_err(|error| match error {
+                    VoxelsError::Scan(error) => Stop::of_scan(&patient.scenario, error),
+                    VoxelsError::Target(finding) => finding.into(),
+                })?;
             for remark in anatomy.remarks() {
                 if !remarks.contains(remark) {
                     remarks.push(remark.clone());

@@ -25,7 +25,8 @@ pub use by_points::direction;
 use by_points::from_entry_and_target;
 pub(crate) use by_points::target_inside;
 use checks::{check_place, check_target};
-pub(crate) use needle_path::check_insertions;
+pub use needle_path::{BevelFacing, RunsAlong, bevel_clock};
+pub(crate) use needle_path::{bevel_facing, check_insertions};
 
 /// Angle of the guide about the needle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

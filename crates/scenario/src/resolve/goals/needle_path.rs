@@ -8,7 +8,7 @@ use needlebench_phantom::{Phantom, Tissue};
 use needlebench_insertion::WARNED_SLOPE;
 
 use super::Goal;
-use crate::resolve::imperfections::{Imperfections, KnownBends, NeedlePath, TissueNeedle};
+use crate::resolve::imperfections::{Imperfections, NeedlePath, TissueNeedle};
 use crate::resolve::phantom::PlacedPhantom;
 use crate::scenario::{BevelFace, NeedleBlock, Scenario};
 
@@ -17,6 +17,100 @@ const BONE: &str = "bone";
 
 /// Least sine of the angle between a needle and a direction that its bevel is to face.
 const LEAST_SINE: f64 = 0.3;
+
+/// Where the face of a needle's bevel looks, phantom frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BevelFacing {
+    /// Anywhere.
+    Unknown,
+    /// Clockwise from the patient's head as seen along the insertion, rad.
+    Clock(f64),
+    /// Along a vector.
+    Along(Vector3<f64>),
+    /// Towards a place, m.
+    Towards(Point3<f64>),
+}
+
+/// A needle runs along what its bevel is to face.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RunsAlong;
+
+impl BevelFacing {
+    /// Unit vector lateral to a needle, from where it enters to where it ends (phantom frame), towards which its
+    /// bevelled tip is pushed: away from the face. None where nobody knows.
+    ///
+    /// # Errors
+    /// [`RunsAlong`].
+    pub fn pushed_towards(
+        &self,
+        entry: &Point3<f64>,
+        tip: &Point3<f64>,
+    ) -> Result<Option<Vector3<f64>>, RunsAlong> {
+        let faced = match self {
+            Self::Unknown => return Ok(None),
+            Self::Clock(angle_rad) => {
+                let [twelve, three] = bevel_clock(entry, tip);
+                let (sine, cosine) = libm::sincos(*angle_rad);
+                twelve * cosine + three * sine
+            }
+            Self::Along(direction) => *direction,
+            Self::Towards(place) => place - entry,
+        };
+        let off = across(&(tip - entry).normalize(), &faced.normalize());
+        if off.norm() < LEAST_SINE {
+            return Err(RunsAlong);
+        }
+        Ok(Some(-off.normalize()))
+    }
+}
+
+fn across(axis: &Vector3<f64>, direction: &Vector3<f64>) -> Vector3<f64> {
+    direction - axis * axis.dot(direction)
+}
+
+/// Twelve and three on the clock at the hub of a needle, unit vectors lateral to it (phantom frame): towards the
+/// patient's head as near as the needle lets, and a quarter further as seen along the insertion.
+pub fn bevel_clock(entry: &Point3<f64>, tip: &Point3<f64>) -> [Vector3<f64>; 2] {
+    let axis = (tip - entry).normalize();
+    let head = if axis.z.abs() < 0.99 {
+        Vector3::z()
+    } else {
+        Vector3::x()
+    };
+    let twelve = across(&axis, &head).normalize();
+    [twelve, axis.cross(&twelve)]
+}
+
+/// Where a bevel looks in a phantom.
+pub(crate) fn bevel_facing(
+    text: &TomlText<'_>,
+    place: &str,
+    block: &NeedleBlock,
+    phantom: &Phantom,
+) -> Result<BevelFacing, Finding> {
+    Ok(match block.face() {
+        BevelFace::Unknown => BevelFacing::Unknown,
+        BevelFace::Clock(angle_rad) => BevelFacing::Clock(angle_rad),
+        BevelFace::Direction(direction) => BevelFacing::Along(direction.into()),
+        BevelFace::Structure(name) => {
+            let middle = phantom.middle_of(name).ok_or_else(|| {
+                let message = format!("`{name}` is neither a direction nor a structure of the phantom");
+                let structures = phantom.parts.iter().filter(|part| part.tissue != Tissue::Marker);
+                let names = structures.map(|part| part.organ.as_deref().unwrap_or(&part.name));
+                let near = nearest_name(name, names);
+                text.finding(&format!("{place}.bevel"), message).hint(near.map_or_else(
+                    || {
+                        "`unknown`, a time such as `3:00`, `superior`, `inferior`, `left`, `right`, `anterior`, \
+                         `posterior`, or a structure such as `spine`"
+                            .to_owned()
+                    },
+                    |near| format!("did you mean `{near}`?"),
+                ))
+            })?;
+            BevelFacing::Towards(middle)
+        }
+    })
+}
 
 /// The way of a goal's needle through a phantom; the goal is in the frame that `to_phantom` is from. None where it is not
 /// known and nothing in the block asks for it.
@@ -64,68 +158,26 @@ pub(super) fn needle_path(
         let finding = text.finding(&format!("{place}.turn_at_mm"), message);
         return Err(finding.hint("a depth between skin and tip"));
     }
+    let facing = bevel_facing(text, place, block, phantom)?;
+    let pushed_towards = facing.pushed_towards(&entry, &tip).map_err(|_| {
+        let message = format!(
+            "the needle of goal `{}` runs along `{}`: its bevel cannot face it",
+            goal.name, block.bevel
+        );
+        text.finding(&format!("{place}.bevel"), message)
+            .hint("choose a direction lateral to the needle, or a time such as `3:00`")
+    })?;
     // Whatever the frame of the goal.
-    let axis = (tip - entry).normalize();
-    let head = if axis.z.abs() < 0.99 {
-        Vector3::z()
-    } else {
-        Vector3::x()
-    };
-    let across = |direction: &Vector3<f64>| direction - axis * axis.dot(direction);
-    let twelve = across(&head).normalize();
-    let three = axis.cross(&twelve);
     let to_guide = (to_phantom.rotation * goal.world_from_guide_exit.rotation).inverse();
     let in_guide = |direction: Vector3<f64>| {
         let turned = to_guide * direction;
         [turned.x, turned.y]
     };
-    let key = format!("{place}.bevel");
-    let faced = match block.face() {
-        BevelFace::Unknown => None,
-        BevelFace::Clock(angle_rad) => {
-            let (sine, cosine) = libm::sincos(angle_rad);
-            Some(twelve * cosine + three * sine)
-        }
-        BevelFace::Direction(direction) => Some(Vector3::from(direction)),
-        BevelFace::Structure(name) => {
-            let middle = phantom.middle_of(name).ok_or_else(|| {
-                let message = format!("`{name}` is neither a direction nor a structure of the phantom");
-                let structures = phantom.parts.iter().filter(|part| part.tissue != Tissue::Marker);
-                let names = structures.map(|part| part.organ.as_deref().unwrap_or(&part.name));
-                let near = nearest_name(name, names);
-                text.finding(&key, message).hint(near.map_or_else(
-                    || {
-                        "`unknown`, a time such as `3:00`, `superior`, `inferior`, `left`, `right`, `anterior`, \
-                         `posterior`, or a structure such as `spine`"
-                            .to_owned()
-                    },
-                    |near| format!("did you mean `{near}`?"),
-                ))
-            })?;
-            Some(middle - entry)
-        }
-    };
-    let pushed_towards = faced
-        .map(|faced| {
-            let off = across(&faced.normalize());
-            if off.norm() < LEAST_SINE {
-                let message = format!(
-                    "the needle of goal `{}` runs along `{}`: its bevel cannot face it",
-                    goal.name, block.bevel
-                );
-                let finding = text.finding(&key, message);
-                return Err(finding
-                    .hint("choose a direction lateral to the needle, or a time such as `3:00`"));
-            }
-            Ok(in_guide(-off.normalize()))
-        })
-        .transpose()?;
-    Ok(Some(NeedlePath {
+    Ok(Some(NeedlePath::new(
         layers,
-        pushed_towards,
-        clock: [twelve, three].map(in_guide),
-        known: KnownBends::default(),
-    }))
+        pushed_towards.map(in_guide),
+        bevel_clock(&entry, &tip).map(in_guide),
+    )))
 }
 
 /// Where a goal's needle ends, in the goal's frame.

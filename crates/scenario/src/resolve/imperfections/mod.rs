@@ -12,7 +12,6 @@ pub use absorbed::AbsorbedSag;
 pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
 pub use localised::{Localisation, Markers, TargetLocalisation};
-pub(crate) use needle::KnownBends;
 pub use needle::{
     Cantilever, Carried, NeedleBending, NeedleDraw, NeedlePath, TissueError, TissueNeedle,
     bend_at_m, bends_along_m,

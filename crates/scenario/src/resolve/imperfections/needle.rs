@@ -52,12 +52,12 @@ pub struct NeedlePath {
     /// quarter further as seen along the insertion.
     pub clock: [[f64; 2]; 2],
     /// What was drawn of it.
-    pub(crate) known: KnownBends,
+    known: KnownBends,
 }
 
 /// Bends that were drawn of one needle at one stand-off: they are the same in all configurations, wherever the patient lies.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct KnownBends(OnceLock<(TissueNeedle, f64, Arc<[Vec<f64>; 2]>)>);
+struct KnownBends(OnceLock<(TissueNeedle, f64, Arc<[Vec<f64>; 2]>)>);
 
 /// They say nothing that the path does not say, and so all are equal.
 impl PartialEq for KnownBends {
@@ -67,6 +67,20 @@ impl PartialEq for KnownBends {
 }
 
 impl NeedlePath {
+    /// A way whose bends were not drawn yet: see the fields.
+    pub fn new(
+        layers: Vec<PassedLayer>,
+        pushed_towards: Option<[f64; 2]>,
+        clock: [[f64; 2]; 2],
+    ) -> Self {
+        Self {
+            layers,
+            pushed_towards,
+            clock,
+            known: KnownBends::default(),
+        }
+    }
+
     /// Bends at skin and tip as `draw` has them, m: drawn once for the needle and the stand-off that are asked for first.
     pub fn bends_m(
         &self,

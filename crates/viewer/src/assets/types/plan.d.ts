@@ -147,6 +147,7 @@ interface RouteAnswer {
 interface Judged {
   free: boolean;
   broken: string | null;
+  bent?: string;
   value: number | null;
   limit: number | null;
   is_least: boolean;
@@ -229,6 +230,12 @@ interface PlannedRoute {
   depth_in_lung_m: number;
   pleural_crossings: number;
   margins: { obstacle: string; part: string | null; distance_m: number | null }[];
+  /** Of the needle as tissue bends it, where one is known. */
+  bend?: {
+    tip_m: number;
+    towards_in_phantom: number[] | null;
+    margins: PlannedRoute['margins'];
+  };
   risk: { odds_ratio: number };
   working: number;
   best: string | null;
