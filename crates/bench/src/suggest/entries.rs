@@ -338,12 +338,16 @@ impl Judge<'_> {
             target: self.target,
             outwards,
         };
-        let mut bends = self.bends.iter();
-        if bends.any(|(anatomy, _)| anatomy.layers(&ray, [0.0, depth_m]).is_err()) {
-            return Err(EntryRule::Bone);
-        }
         let goal = self.placer.place(&self.section_at(direction_deg));
-        let goal = goal.map_err(|_| EntryRule::Blocked)?;
+        let goal = goal.map_err(|_| {
+            // A needle that is asked to be in tissue is placed nowhere behind bone.
+            let mut bends = self.bends.iter();
+            if bends.any(|(anatomy, _)| anatomy.layers(&ray, [0.0, depth_m]).is_err()) {
+                EntryRule::Bone
+            } else {
+                EntryRule::Blocked
+            }
+        })?;
         let to_phantom = placed.world_from_phantom.inverse();
         let entry = to_phantom * goal.entry_m.ok_or(EntryRule::Blocked)?;
         let inwards = to_phantom.rotation * goal.axis.into_inner();

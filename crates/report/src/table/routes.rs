@@ -12,9 +12,15 @@ use needlebench_show::plain_table;
 /// Needle paths of the table.
 const SHOWN: usize = 8;
 
-/// What tables have of a needle that bends, for people.
-pub(super) const BEND_TERMS: &str = "bend: of the tip of the median needle in tissue; behind the slash the clearance \
-     of the needle so bent, where the direction of its bevel is not known the least of twelve";
+/// What tables have of a needle that bends, for people: to a known side, they have its clearances, too.
+pub(super) fn bend_terms(to_known_side: bool) -> &'static str {
+    if to_known_side {
+        "bend: of the tip of the median needle in tissue; behind the slash the clearance of the needle so bent"
+    } else {
+        "bend: of the tip of the median needle in tissue, to a side that is not known; clearances are those of the \
+         straight needle"
+    }
+}
 
 /// Needle paths to a target.
 pub fn routes_text(plan: &RoutePlan) -> String {
@@ -61,9 +67,10 @@ pub fn routes_text(plan: &RoutePlan) -> String {
         "odds: product of published pneumothorax odds ratios relative to a path without risk \
          factors; for ranking only, not a probability\nbone, vessel, organ: lower bounds of the needle clearance",
     );
-    if plan.routes.iter().any(|route| route.bend.is_some()) {
+    let mut bends = plan.routes.iter().filter_map(|route| route.bend.as_ref());
+    if let Some(bend) = bends.next() {
         text.push('\n');
-        text.push_str(BEND_TERMS);
+        text.push_str(bend_terms(bend.towards_in_phantom.is_some()));
     }
     if plan.margins.iter().any(|margin| !margin.known) {
         text.push_str("\n?: no such structure labelled in this patient");
@@ -257,7 +264,9 @@ fn table(plan: &RoutePlan) -> String {
             near.map_or_else(|| "far".to_owned(), mm)
         };
         for (index, (margin, base)) in route.margins.iter().zip(&plan.margins).enumerate() {
-            let bent = route.bend.as_ref().map(|bend| told(&bend.margins[index]));
+            let known = route.bend.as_ref();
+            let known = known.filter(|bend| bend.towards_in_phantom.is_some());
+            let bent = known.map(|bend| told(&bend.margins[index]));
             row.push(match bent {
                 _ if !base.known => "?".to_owned(),
                 Some(bent) => format!("{}/{bent}", told(margin)),

@@ -11,7 +11,7 @@ use needlebench_patient::Refused;
 use needlebench_cell::{part_in_words, reason_in_words};
 use needlebench_show::plain_table;
 
-use super::routes::BEND_TERMS;
+use super::routes::bend_terms;
 
 /// Entries for a target.
 pub fn entries_text(found: &EntrySearch) -> String {
@@ -47,8 +47,8 @@ pub fn entries_text(found: &EntrySearch) -> String {
         .map(|tissue| format!("{tissue}\n(mm)"))
         .collect();
     header.extend(headings.iter().map(String::as_str));
-    let bends = found.entries.iter().any(|entry| entry.bent.is_some());
-    if bends {
+    let bent = found.entries.iter().find_map(|entry| entry.bent.as_ref());
+    if bent.is_some() {
         header.insert(4, "bend\n(mm)");
     }
     header.extend(["feasible", "score\nof 100"]);
@@ -64,9 +64,8 @@ pub fn entries_text(found: &EntrySearch) -> String {
         table.add_row(entry_row(index, entry, &tissues, is_planned));
     }
     let _ = writeln!(text, "{table}\n{ENTRY_TERMS}");
-    if bends {
-        text.push_str(BEND_TERMS);
-        text.push('\n');
+    if let Some(bent) = bent {
+        let _ = writeln!(text, "{}", bend_terms(bent.is_side_known));
     }
     for (index, entry) in found.entries.iter().enumerate() {
         let nearest = entry.margins.iter().map(|each| part_in_words(&each.part));
@@ -111,8 +110,10 @@ fn entry_row(index: usize, entry: &Entry, tissues: &[&str], is_planned: bool) ->
         };
         let straight = clearance(&entry.margins);
         row.push(match &entry.bent {
-            Some(bent) => format!("{straight}/{}", clearance(&bent.bent_margins)),
-            None => straight,
+            Some(bent) if bent.is_side_known => {
+                format!("{straight}/{}", clearance(&bent.bent_margins))
+            }
+            _ => straight,
         });
     }
     row.push(format!("{} of 8", entry.working));

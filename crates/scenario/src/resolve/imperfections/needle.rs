@@ -57,7 +57,14 @@ pub struct NeedlePath {
 
 /// Bends that were drawn of one needle at one stand-off: they are the same in all configurations, wherever the patient lies.
 #[derive(Debug, Clone, Default)]
-struct KnownBends(OnceLock<(TissueNeedle, f64, Arc<[Vec<f64>; 2]>)>);
+struct KnownBends(OnceLock<Drawn>);
+
+#[derive(Debug, Clone)]
+struct Drawn {
+    needle: TissueNeedle,
+    stand_off_m: f64,
+    bends_m: Arc<[Vec<f64>; 2]>,
+}
 
 /// They say nothing that the path does not say, and so all are equal.
 impl PartialEq for KnownBends {
@@ -88,10 +95,13 @@ impl NeedlePath {
         stand_off_m: f64,
         draw: impl Fn() -> [Vec<f64>; 2],
     ) -> Arc<[Vec<f64>; 2]> {
-        let of_this = || (needle.clone(), stand_off_m, Arc::new(draw()));
-        let (known, at_m, bends_m) = self.known.0.get_or_init(of_this);
-        if known == needle && *at_m == stand_off_m {
-            bends_m.clone()
+        let known = self.known.0.get_or_init(|| Drawn {
+            needle: needle.clone(),
+            stand_off_m,
+            bends_m: Arc::new(draw()),
+        });
+        if known.needle == *needle && known.stand_off_m == stand_off_m {
+            Arc::clone(&known.bends_m)
         } else {
             Arc::new(draw())
         }
