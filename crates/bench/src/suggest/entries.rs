@@ -339,10 +339,10 @@ impl Judge<'_> {
             outwards,
         };
         let goal = self.placer.place(&self.section_at(direction_deg));
-        let goal = goal.map_err(|_| {
+        let goal = goal.map_err(|finding| {
             // A needle that is asked to be in tissue is placed nowhere behind bone.
-            let mut bends = self.bends.iter();
-            if bends.any(|(anatomy, _)| anatomy.layers(&ray, [0.0, depth_m]).is_err()) {
+            let is_of_needle = |key: &String| key.ends_with(".needle.model");
+            if finding.key.as_ref().is_some_and(is_of_needle) {
                 EntryRule::Bone
             } else {
                 EntryRule::Blocked

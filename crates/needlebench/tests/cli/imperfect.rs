@@ -66,7 +66,8 @@ fn engines_and_balance_of_torques_agree_on_where_an_imperfect_arm_ends() {
         }
         let total = &each["budget"]["total"]["at_target"];
         assert!(total["analytic"]["rms_m"].number() > 0.5e-3, "{total}");
-        assert_eq!(each["budget"]["sources"].list().len(), 13);
+        // Of 13, the play in the guide is solved with the needle.
+        assert_eq!(each["budget"]["sources"].list().len(), 12);
     }
     assert!(simulated > 0);
 
