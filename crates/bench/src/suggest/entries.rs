@@ -19,7 +19,7 @@ use needlebench_parallel::{Control, in_parallel};
 use needlebench_patient::routes::{RouteTask, WithRobot};
 use needlebench_patient::{Refused, SuggestError, counted};
 use needlebench_planning::{Planner, crossed_fissures, judged_straight};
-use needlebench_routing::{Anatomy, Obstacle, Ray, RouteNeedle, SolidAnatomy};
+use needlebench_routing::{Obstacle, Ray, RouteNeedle, SolidAnatomy};
 use needlebench_scenario::scenario::{GoalSection, RouteSection};
 use needlebench_scenario::{Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction};
 use needlebench_study::Outcome;
