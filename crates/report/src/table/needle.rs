@@ -1,5 +1,6 @@
 //! How a needle bends in tissue: a sentence, and what can be done about it.
 
+use needlebench_cell::part_in_words;
 use needlebench_evaluation::report::{BendSummary, NeedleReport};
 use needlebench_show::Block;
 
@@ -61,10 +62,10 @@ pub(crate) fn needle_blocks(needle: &NeedleReport) -> Vec<Block> {
              from the hub)",
             best.clock,
             one(best.distance_m),
-            best.part,
+            part_in_words(&best.part),
             worst.clock,
             one(worst.distance_m),
-            worst.part,
+            part_in_words(&worst.part),
         )]));
     }
     if let Some(breath) = needle.breath {

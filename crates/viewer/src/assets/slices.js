@@ -423,6 +423,23 @@ class Slice extends Picture {
     const [from, to] = [route.entry_index, route.target_index];
     /** @param {number} share */
     const at = (share) => this.onCanvas(this.place(PLAN.add(from, PLAN.add(to, from, -1), share)));
+    // Under the straight needle.
+    /** @param {Index} index */
+    const mm = (index) => index.map((value, axis) => value * volume.spacing[axis]);
+    const along = PLAN.unit(PLAN.add(mm(to), mm(from), -1));
+    const normal = [0, 1, 2].map((axis) => Number(axis === w));
+    // A needle along the normal bends to any side of the slice.
+    const aside =
+      Math.abs(along[w]) < 0.999
+        ? PLAN.unit(PLAN.cross(along, normal))
+        : [0, 1, 2].map((axis) => Number(axis === this.plane.u));
+    for (const bent of PLAN.bends(route, mm(from), along, aside))
+      this.polyline(
+        context,
+        bent.map((point) => this.onCanvas(this.place(point.map((value, axis) => value / volume.spacing[axis])))),
+        PLAN.COLORS.bent,
+        1,
+      );
     this.line(context, at(-15e-3 / route.length_m), at(1), PLAN.COLORS.needle, 1, [5, 4]);
     const half = Math.max(0.5, 1 / volume.spacing[w]);
     const across = to[w] - from[w];
@@ -441,22 +458,6 @@ class Slice extends Picture {
         Math.max(1e3 * facts.needle_diameter_m * this.scale, 2),
       );
     }
-    /** @param {Index} index */
-    const mm = (index) => index.map((value, axis) => value * volume.spacing[axis]);
-    const along = PLAN.unit(PLAN.add(mm(to), mm(from), -1));
-    const normal = [0, 1, 2].map((axis) => Number(axis === w));
-    // A needle along the normal bends to any side of the slice.
-    const aside =
-      Math.abs(along[w]) < 0.999
-        ? PLAN.unit(PLAN.cross(along, normal))
-        : [0, 1, 2].map((axis) => Number(axis === this.plane.u));
-    for (const bent of PLAN.bends(route, mm(from), along, aside))
-      this.polyline(
-        context,
-        bent.map((point) => this.onCanvas(this.place(point.map((value, axis) => value / volume.spacing[axis])))),
-        PLAN.COLORS.bent,
-        1,
-      );
     if (tip) {
       const axes = [
         [1, 0, 0],
