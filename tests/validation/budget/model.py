@@ -318,9 +318,12 @@ def defaults(section: str, given: dict) -> dict:
     """A block of the scenario with what it leaves out as the schema describes it."""
     schema = json.loads((ROOT / "scenarios" / "scenario.schema.json").read_text())
     properties = schema["definitions"][section]["properties"]
-    return {
-        key: value["default"] for key, value in properties.items() if "default" in value
-    } | given
+    usual = {key: value["default"] for key, value in properties.items() if "default" in value}
+    if section == "NeedleBlock":
+        # What the schema says in words: in tissue, unless it has a key of a needle in air.
+        usual["model"] = "cantilever" if "side_force_n" in given else "tissue"
+        usual["side_force_n"] = 0.1
+    return usual | given
 
 
 def read_toml(path: Path) -> dict:
