@@ -124,16 +124,18 @@ pub(crate) fn configuration_picture(
     let behind = exit
         - goal.axis.into_inner()
             * (resolved.cell.tool.guide_length_m() + resolved.cell.tool.needle.length_m * 0.5);
-    scene.lines.push(Line3 {
-        from_m: behind,
-        to_m: goal.target_m,
-        color_rgba: if refused.is_some() {
-            REFUSED_RGBA
-        } else {
-            NEEDLE_RGBA
-        },
+    let color_rgba = if refused.is_some() {
+        REFUSED_RGBA
+    } else {
+        NEEDLE_RGBA
+    };
+    let lines = needle_line(resolved, goal, behind);
+    scene.lines.extend(lines.windows(2).map(|ends| Line3 {
+        from_m: ends[0],
+        to_m: ends[1],
+        color_rgba,
         width_px: 3.0,
-    });
+    }));
     scene.labels.push(Label {
         text: caption(shown),
         anchor: Anchor::TopLeft,
@@ -154,6 +156,15 @@ pub(crate) fn configuration_picture(
         });
     }
     Some(stage.picture(&scene))
+}
+
+/// The needle from a place behind the guide's exit to its tip: as tissue bends it where it is known to which side, else straight.
+fn needle_line(resolved: &ResolvedScenario, goal: &Goal, behind: Point3<f64>) -> Vec<Point3<f64>> {
+    let expected = resolved.expected.as_ref();
+    let needle = expected.and_then(|expected| expected.imperfections.tissue());
+    let bent = needle.and_then(|needle| goal.median_line(needle));
+    let inside = bent.unwrap_or_else(|| vec![goal.aimed_m()]);
+    [behind].into_iter().chain(inside).collect()
 }
 
 /// Draws the cell of a scenario with the arm in a posture at its first goal.
@@ -274,6 +285,12 @@ fn caption(shown: &Shown<'_>) -> String {
     if let Some(budget) = &report.budget {
         let rms_m = budget.total.at_target.analytic.rms_m;
         lines.push(format!("RMS tip error {}", small_length(rms_m)));
+    }
+    let mut goals = shown.run.goals.iter();
+    let goal = goals.find(|goal| goal.name == shown.goal.name);
+    if let Some(needle) = goal.and_then(|goal| goal.needle.as_ref()) {
+        let bend_m = needle.bend.median_m.abs();
+        lines.push(format!("needle bends {}", small_length(bend_m)));
     }
     for (engine, measured) in &report.engines {
         let error = small_length(measured.needle.tip_position_error_m);
