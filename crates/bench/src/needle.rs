@@ -1,5 +1,7 @@
 //! How a goal's needle bends in tissue, and what can be done about it.
 
+use std::sync::Arc;
+
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use needlebench_evaluation::report::{
     BendSummary, BevelDirection, NeedleAlternative, NeedleInBreath, NeedleLayer, NeedleReport,
@@ -10,14 +12,7 @@ use needlebench_numerics::order::quantile_position;
 use needlebench_planning::bent_route;
 use needlebench_scenario::imperfections::{Breathing, TissueNeedle, bend_at_m, bends_along_m};
 use needlebench_scenario::{Goal, NeedlePath, PlacedPhantom, ResolvedScenario};
-use needlebench_uncertainty::{DRAWS, drawn_bends_m};
-
-/// Draws that a search for the best depth of a turn takes: the answer is flat within 5 mm.
-const SEARCH_DRAWS: usize = 64;
-
-/// Depths of a turn that are tried, as shares of the way.
-const TURNS: std::ops::RangeInclusive<u32> = 4..=19;
-const TURN_STEPS: f64 = 20.0;
+use needlebench_uncertainty::drawn_bends_m;
 
 /// Longer guides and smaller stand-offs that are tried, m.
 const GUIDES_M: [f64; 2] = [30e-3, 80e-3];
@@ -29,14 +24,13 @@ pub(crate) fn needle_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<
     let needle = expected.imperfections.tissue()?;
     let (path, placed) = (goal.needle_path.as_deref()?, resolved.phantom.as_ref()?);
     let stand_off_m = goal.standoff_m.unwrap_or(0.0);
-    let medians = needle.medians();
-    let inserted = needle.insert(&medians, path, stand_off_m).ok()?;
+    let inserted = needle.insert_median(path, stand_off_m).ok()?;
     let has_direction = needle.tip == Point::Bevel;
     let towards = needle.pushed_towards(path);
     let path_m = bends_along_m(&inserted);
-    let sizes_m = sizes_m(needle, goal, DRAWS);
+    let sizes_m = sizes_m(needle, goal);
     let tool = &resolved.cell.tool;
-    let with_forces = needle.layers(&medians, path).ok()?;
+    let with_forces = needle.layers(&needle.medians(), path).ok()?;
     let layers = path.layers.iter().zip(with_forces.all());
     let layers = layers.map(|(passed, layer)| NeedleLayer {
         tissue: passed.tissue.name(),
@@ -73,8 +67,17 @@ pub(crate) fn needle_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<
             let points = goal.bent_line(&path_m, towards).into_iter();
             points.map(|point| point.coords.into()).collect()
         }),
-        turned: (has_direction && needle.turn_at_m.is_none()).then(|| turned(needle, goal, path)),
-        aimed_rms_m: towards.map(|_| aimed_rms_m(needle, &sizes_m)),
+        turn_at_m: path.turn_at_m,
+        turned: if has_direction && path.turn_at_m.is_none() {
+            turned(needle, goal, path)
+        } else {
+            None
+        },
+        aim_m: needle.is_aimed.then(|| goal.aim_m.norm()),
+        aimed_rms_m: match towards {
+            Some(_) => Some(aimed_rms_m(needle, goal, path, &sizes_m)?),
+            None => None,
+        },
         alternatives: alternatives(resolved, needle, goal),
         breath: expected
             .imperfections
@@ -125,8 +128,11 @@ fn summary_of(
     } else {
         "; forces assumed"
     };
+    let turn = report.turn_at_m.map_or_else(String::new, |at_m| {
+        format!(", turned by 180 deg at {:.0} mm", at_m * 1e3)
+    });
     let bends = format!(
-        "needle {} G, {}, {stylet}: bends {} mm {side} (90 % of needles {} to {}{assumed})",
+        "needle {} G, {}, {stylet}{turn}: bends {} mm {side} (90 % of needles {} to {}{assumed})",
         report.gauge,
         report.tip,
         mm(median_m.abs()),
@@ -144,9 +150,14 @@ fn summary_of(
             mm(rms_m)
         )
     });
-    let aimed = report
-        .aimed_rms_m
-        .map(|aimed_m| format!("; aimed against it: RMS {} mm", mm(aimed_m)));
+    let aimed = report.aimed_rms_m.map(|aimed_m| match report.aim_m {
+        Some(aim_m) => format!(
+            "; aimed {} mm against it: RMS {} mm",
+            mm(aim_m),
+            mm(aimed_m)
+        ),
+        None => format!("; aimed against it: RMS {} mm", mm(aimed_m)),
+    });
     let is_far = report.largest_slope > WARNED_SLOPE;
     let rough = is_far.then(|| "; it bends more than its model is for: a rough figure".to_owned());
     let parts = [Some(bends), before_lung, turned, aimed, rough];
@@ -173,8 +184,8 @@ fn side_of(towards: &Vector3<f64>) -> String {
     }
 }
 
-fn sizes_m(needle: &TissueNeedle, goal: &Goal, draws: usize) -> Vec<f64> {
-    let drawn_m = drawn_bends_m(needle, goal, draws).into_iter();
+fn sizes_m(needle: &TissueNeedle, goal: &Goal) -> Vec<f64> {
+    let drawn_m = drawn_bends_m(needle, goal).into_iter();
     drawn_m.map(|[_, at_tip_m]| at_tip_m).collect()
 }
 
@@ -200,13 +211,27 @@ fn summary(sizes_m: &[f64]) -> BendSummary {
     }
 }
 
-/// What is left of the bends once the axis is aimed against their mean, m.
-fn aimed_rms_m(needle: &TissueNeedle, sizes_m: &[f64]) -> f64 {
+/// What is left of the bends, m, once the axis is aimed as `aim` has it: by what is, or would be, done.
+fn aimed_rms_m(
+    needle: &TissueNeedle,
+    goal: &Goal,
+    path: &NeedlePath,
+    sizes_m: &[f64],
+) -> Option<f64> {
+    let aim_m = if needle.is_aimed {
+        goal.aim_m.norm()
+    } else {
+        needle
+            .mean_bend_m(path, goal.standoff_m.unwrap_or(0.0))
+            .ok()?
+            .abs()
+    };
     let mean_m = sizes_m.iter().sum::<f64>() / sizes_m.len() as f64;
     // The mean of a direction that is normal about the known one is shorter than 1.
-    let aimed_m = mean_m * libm::exp(-0.5 * needle.bevel_spread_rad * needle.bevel_spread_rad);
+    let shrunk = libm::exp(-0.5 * needle.bevel_spread_rad * needle.bevel_spread_rad);
     let square_m2 = rms_m(sizes_m) * rms_m(sizes_m);
-    (square_m2 - aimed_m * aimed_m).max(0.0).sqrt()
+    let left_m2 = square_m2 - 2.0 * aim_m * mean_m.abs() * shrunk + aim_m * aim_m;
+    Some(left_m2.max(0.0).sqrt())
 }
 
 /// Depth at which a needle first enters a lung, m.
@@ -252,22 +277,17 @@ fn in_breath(
 }
 
 /// The turn that leaves the least.
-fn turned(needle: &TissueNeedle, goal: &Goal, path: &NeedlePath) -> TurnedNeedle {
-    let depth_m: f64 = path.layers.iter().map(|layer| layer.length_m).sum();
-    let turned_at = |at_m: f64| TissueNeedle {
-        turn_at_m: Some(at_m),
-        ..needle.clone()
+fn turned(needle: &TissueNeedle, goal: &Goal, path: &NeedlePath) -> Option<TurnedNeedle> {
+    let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+    let at_m = needle.best_turn_m(path, stand_off_m).ok()?;
+    let turned = Goal {
+        needle_path: Some(Arc::new(path.turned_at(Some(at_m)))),
+        ..goal.clone()
     };
-    let tried = TURNS.map(|step| {
-        let at_m = depth_m * f64::from(step) / TURN_STEPS;
-        (at_m, rms_m(&sizes_m(&turned_at(at_m), goal, SEARCH_DRAWS)))
-    });
-    let best = tried.min_by(|a, b| a.1.total_cmp(&b.1));
-    let (at_m, _) = best.expect("some depths are tried");
-    TurnedNeedle {
+    Some(TurnedNeedle {
         at_m,
-        rms_m: rms_m(&sizes_m(&turned_at(at_m), goal, DRAWS)),
-    }
+        rms_m: rms_m(&sizes_m(needle, &turned)),
+    })
 }
 
 /// Other needles in the same guide, other tips, stand-offs and guides.
@@ -287,7 +307,7 @@ fn alternatives(
     };
     let mut all = Vec::new();
     let mut add = |what: String, needle: &TissueNeedle, goal: &Goal| {
-        let bend = summary(&sizes_m(needle, goal, DRAWS));
+        let bend = summary(&sizes_m(needle, goal));
         all.push(NeedleAlternative { what, bend });
     };
     let gauges = Gauge::ALL.into_iter().filter(|gauge| {
@@ -322,10 +342,14 @@ fn alternatives(
         if tip != needle.tip {
             let other = TissueNeedle {
                 tip,
-                turn_at_m: None,
                 ..needle.clone()
             };
-            add(what.to_owned(), &other, goal);
+            let straight_on = goal.needle_path.as_deref().map(|path| path.turned_at(None));
+            let goal = Goal {
+                needle_path: straight_on.map(Arc::new),
+                ..goal.clone()
+            };
+            add(what.to_owned(), &other, &goal);
         }
     }
     let stand_off_m = goal.standoff_m.unwrap_or(0.0);

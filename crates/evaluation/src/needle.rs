@@ -90,8 +90,8 @@ pub fn measure_guide(
     let actual = exit.rotation * Vector3::z();
     let planned = goal.axis.into_inner();
     let tip = exit * Point3::new(0.0, 0.0, goal.insertion_length_m);
-    let miss = tip - goal.target_m;
-    let to_target = goal.target_m - exit_point;
+    let aimed = goal.aimed_m();
+    let (miss, to_target) = (tip - aimed, aimed - exit_point);
     let off_axis_m = |to: Vector3<f64>| (to - actual * actual.dot(&to)).norm();
     let in_plane = |axes: [usize; 2]| {
         let to_phantom = phantom?.world_from_phantom.rotation.inverse();
@@ -106,6 +106,7 @@ pub fn measure_guide(
         )?;
         Some((exit_point + axis.into_inner() * enters_m - entry).norm())
     });
+    let true_aimed = goal.true_target_m.map(|at| at + goal.aim_m);
     NeedleMeasurement {
         tip_position_error_m: miss.norm(),
         depth_error_m: miss.dot(&planned),
@@ -117,7 +118,7 @@ pub fn measure_guide(
         entry_lateral_error_m: goal.entry_m.map(|entry| off_axis_m(entry - exit_point)),
         axial_angle_error_rad: in_plane([0, 1]),
         sagittal_angle_error_rad: in_plane([1, 2]),
-        true_target_error_m: goal.true_target_m.map(|at| (tip - at).norm()),
-        true_target_lateral_m: goal.true_target_m.map(|at| off_axis_m(at - exit_point)),
+        true_target_error_m: true_aimed.map(|at| (tip - at).norm()),
+        true_target_lateral_m: true_aimed.map(|at| off_axis_m(at - exit_point)),
     }
 }

@@ -196,10 +196,17 @@ pub struct NeedleReport {
     pub path_m: Vec<[f64; 2]>,
     /// Points of that path in the world, from the skin to the tip; none where its direction is not known.
     pub path_in_world_m: Vec<[f64; 3]>,
+    /// Depth behind the skin at which it is turned by 180 degrees; none if it is not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turn_at_m: Option<f64>,
     /// Turned by 180 degrees at the depth where that helps most; none for a tip without a direction, and for a needle that is
     /// turned as it is.
     pub turned: Option<TurnedNeedle>,
-    /// Root mean square of what is left if the axis is aimed against the mean bend; none where the direction is not known.
+    /// How far beside the target the guide is aimed against the mean bend; none if it is aimed at the target.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub aim_m: Option<f64>,
+    /// Root mean square of what is left if the axis is aimed against the mean bend, as it is where `aim_m` is given; none where
+    /// the direction is not known.
     pub aimed_rms_m: Option<f64>,
     /// What other needles, guides and hands would give.
     pub alternatives: Vec<NeedleAlternative>,

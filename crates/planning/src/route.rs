@@ -203,7 +203,7 @@ fn needle_end(goal: &Goal) -> Point3<f64> {
     let exit = Point3::from(goal.world_from_guide_exit.translation.vector);
     let tip = exit + goal.axis.into_inner() * goal.insertion_length_m;
     let deeper = (tip - goal.target_m).dot(&goal.axis) > 0.0;
-    if deeper { tip } else { goal.target_m }
+    if deeper { tip } else { goal.aimed_m() }
 }
 
 /// Whether the scenario keeps the needle away from a part.

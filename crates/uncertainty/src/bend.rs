@@ -91,14 +91,14 @@ pub(crate) fn across(towards: &Vector2<f64>) -> Vector2<f64> {
 }
 
 /// Draws that the distribution of a bend is known by: its mean to 0.5 %, its standard deviation to 4 % (20 000 others).
-pub const DRAWS: usize = 512;
+const DRAWS: usize = 512;
 
 /// How far needles are off a goal's axis where they pierce the skin and at their tips, m, towards where their bevel pushes
-/// them: the same draws of patients and needles for every needle and goal, as many as are asked for.
-pub fn drawn_bends_m(needle: &TissueNeedle, goal: &Goal, draws: usize) -> Vec<[f64; 2]> {
+/// them: the same draws of patients and needles for every needle and goal.
+pub fn drawn_bends_m(needle: &TissueNeedle, goal: &Goal) -> Vec<[f64; 2]> {
     let mut variables = vec![Variable::Normal; DrawnNeedle::NORMALS];
     variables.push(Variable::Uniform);
-    let rows = hypercube(&variables, draws, &mut SplitMix64::new(0));
+    let rows = hypercube(&variables, DRAWS, &mut SplitMix64::new(0));
     let sizes_m = |row: Vec<f64>| DrawnNeedle::new(needle, &row).sizes_m(goal);
     rows.into_iter().map(sizes_m).collect()
 }
@@ -123,6 +123,8 @@ pub(crate) struct Bends {
     /// the angle, rad, or none where any angle is as likely.
     axes: [Vector2<f64>; 2],
     spread_rad: Option<f64>,
+    /// How far the axis is aimed off the target, the same axes, m.
+    aim_m: Vector2<f64>,
 }
 
 impl Bends {
@@ -135,7 +137,7 @@ impl Bends {
         let stand_off_m = goal.standoff_m.unwrap_or(0.0);
         needle.bends_m(&needle.medians(), path, stand_off_m)?;
         let sizes_m = path.bends_m(needle, stand_off_m, || {
-            let drawn_m = drawn_bends_m(needle, goal, DRAWS);
+            let drawn_m = drawn_bends_m(needle, goal);
             [0, 1].map(|index| {
                 let mut all_m: Vec<f64> = drawn_m.iter().map(|both_m| both_m[index]).collect();
                 all_m.sort_by(f64::total_cmp);
@@ -148,12 +150,15 @@ impl Bends {
             sizes_m,
             axes: [from, across(&from)],
             spread_rad: towards.map(|_| needle.bevel_spread_rad),
+            aim_m: (goal.world_from_guide_exit.rotation.inverse() * goal.aim_m).xy(),
         })
     }
 
     /// At skin (0) or tip (1), along the axes of the guide's exit turned by `turn`.
     pub fn at(&self, index: usize, turn: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Bend {
+        let aim_m = [Vector2::zeros(), self.aim_m][index];
         Bend {
+            aim_m: turn(Vector3::new(aim_m.x, aim_m.y, 0.0)),
             sizes_m: Arc::clone(&self.sizes_m),
             index,
             axes: self
@@ -173,13 +178,16 @@ pub(crate) struct Bend {
     index: usize,
     axes: [Vector3<f64>; 2],
     spread_rad: Option<f64>,
+    /// How far the axis is aimed off the place, m.
+    aim_m: Vector3<f64>,
 }
 
 impl Bend {
     /// The same along other axes.
     pub fn turned(self, turn: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Self {
         Self {
-            axes: self.axes.map(turn),
+            axes: self.axes.map(&turn),
+            aim_m: turn(self.aim_m),
             ..self
         }
     }
@@ -192,10 +200,7 @@ impl Bend {
         let square_m2 = sizes_m.iter().map(|size| size * size).sum::<f64>() / count;
         let squares = self.axes.map(|axis| axis * axis.transpose());
         match self.spread_rad {
-            None => (
-                Vector3::zeros(),
-                (squares[0] + squares[1]) * (0.5 * square_m2),
-            ),
+            None => (self.aim_m, (squares[0] + squares[1]) * (0.5 * square_m2)),
             Some(spread_rad) => {
                 // Of a normal angle: E cos, E cos^2, E sin^2.
                 let shrunk = libm::exp(-0.5 * spread_rad * spread_rad);
@@ -203,7 +208,10 @@ impl Bend {
                 let mean = self.axes[0] * (mean_m * shrunk);
                 let second =
                     squares[0] * (0.5 * (1.0 + twice)) + squares[1] * (0.5 * (1.0 - twice));
-                (mean, second * square_m2 - mean * mean.transpose())
+                (
+                    self.aim_m + mean,
+                    second * square_m2 - mean * mean.transpose(),
+                )
             }
         }
     }
@@ -228,6 +236,6 @@ impl Bend {
             Some(spread_rad) => spread_rad * needlebench_numerics::normal::quantile(angle),
         };
         let (sine, cosine) = libm::sincos(angle_rad);
-        (self.axes[0] * cosine + self.axes[1] * sine) * size_m
+        self.aim_m + (self.axes[0] * cosine + self.axes[1] * sine) * size_m
     }
 }

@@ -21,7 +21,7 @@ mod servo;
 mod settle;
 mod truth;
 
-pub use bend::{DRAWS, DrawnNeedle, NoBend, drawn_bends_m};
+pub use bend::{DrawnNeedle, NoBend, drawn_bends_m};
 pub use servo::servo_of;
 pub use settle::{RestingFriction, SettleError, Settled, resting_friction, settle, settle_after};
 pub use truth::{Bending, Draw, Layout, Source, Stage, Truth};

@@ -537,7 +537,7 @@ impl Truth {
         })
     }
 
-    /// How far the needle bends off its line at skin and target, world, m.
+    /// How far the needle is off its line at skin and target, world, m: its bend, and how far the line is aimed off the target.
     fn bent_m(&self, goal: &Goal) -> [Vector3<f64>; 2] {
         let across = match &self.bending {
             Bending::None => return [Vector3::zeros(); 2],
@@ -549,7 +549,8 @@ impl Truth {
             Bending::Tissue(needle) => needle.bent_m(goal),
         };
         let turn = goal.world_from_guide_exit.rotation;
-        across.map(|across| turn * Vector3::new(across.x, across.y, 0.0))
+        let [at_skin, at_tip] = across.map(|across| turn * Vector3::new(across.x, across.y, 0.0));
+        [at_skin, at_tip + goal.aim_m]
     }
 
     /// Where skin (0) or target (1) is when the needle is in, as the straight needle sees it, world: from where it
@@ -571,16 +572,18 @@ impl Truth {
     ///
     /// A true target is where it is, whatever registration and image say of it: breathing and tissue alone move it.
     pub fn goal(&self, planned: &Goal) -> Goal {
-        let entry_m = planned.entry_m.unwrap_or(planned.target_m);
+        let aimed_m = planned.aimed_m();
+        let entry_m = planned.entry_m.unwrap_or(aimed_m);
         let bent_m = self.bent_m(planned);
-        let [entry_m, target_m] =
-            self.wanted_beside(planned, &[entry_m, planned.target_m], &bent_m);
-        let known = planned.true_target_m;
+        let [entry_m, target_m] = self.wanted_beside(planned, &[entry_m, aimed_m], &bent_m);
+        let known = planned.true_target_m.map(|at| at + planned.aim_m);
         Goal {
             target_m,
             true_target_m: known
                 .map(|at| self.at_insertion(planned, 1, at, Vector3::zeros(), &bent_m)),
             entry_m: planned.entry_m.map(|_| entry_m),
+            // That is part of where the target is to a straight needle.
+            aim_m: Vector3::zeros(),
             ..planned.clone()
         }
     }

@@ -145,6 +145,10 @@ pub struct TissueAnswer {
 pub struct BendAnswer {
     /// Depths from the skin and how far the needle is off the straight line there, m; the last one is its tip's.
     pub path_m: Vec<[f64; 2]>,
+    /// How far the tip is off the guide's axis, m.
+    pub tip_m: f64,
+    /// Whether that axis is aimed against the bend, and not at the target.
+    pub is_aimed: bool,
     /// Towards where, a unit vector of `ct`; none where that is not known.
     pub towards: Option<[f64; 3]>,
     /// Whether the force behind it was measured, and not assumed.
@@ -408,13 +412,34 @@ fn bend(resolved: &ResolvedScenario, placed: &PlacedPhantom, goal: &Goal) -> Opt
     let needle = resolved.expected.as_ref()?.imperfections.tissue()?;
     let path = goal.needle_path.as_ref()?;
     let stand_off_m = goal.standoff_m.unwrap_or(0.0);
-    let inserted = needle.insert(&needle.medians(), path, stand_off_m).ok()?;
+    let inserted = needle.insert_median(path, stand_off_m).ok()?;
+    let (tip_m, along_axis_m) = (inserted.tip_m()[0], bends_along_m(&inserted));
+    let Some(towards) = needle.pushed_towards(path) else {
+        return Some(BendAnswer {
+            path_m: along_axis_m,
+            tip_m,
+            is_aimed: false,
+            towards: None,
+            is_force_measured: needle.is_force_measured,
+        });
+    };
+    // Off the line from entry to target, which the axis of an aimed needle leaves at the skin.
+    let entry = goal.entry_m?;
+    let line = UnitVector3::new_normalize(goal.target_m - entry);
+    let across = goal.world_from_guide_exit.rotation * Vector3::new(towards[0], towards[1], 0.0);
+    let across = UnitVector3::new_normalize(across - line.into_inner() * line.dot(&across));
+    let points = goal.bent_line(&along_axis_m, towards).into_iter();
+    let path_m = points.map(|point| {
+        let from_entry = point - entry;
+        [from_entry.dot(&line), from_entry.dot(&across)]
+    });
     // `ct` has the axes of the phantom.
-    let to_ct = placed.world_from_phantom.rotation.inverse() * goal.world_from_guide_exit.rotation;
-    let towards = needle.pushed_towards(path);
+    let to_ct = placed.world_from_phantom.rotation.inverse();
     Some(BendAnswer {
-        path_m: bends_along_m(&inserted),
-        towards: towards.map(|[x, y]| (to_ct * Vector3::new(x, y, 0.0)).into()),
+        path_m: path_m.collect(),
+        tip_m,
+        is_aimed: needle.is_aimed,
+        towards: Some((to_ct * across.into_inner()).into()),
         is_force_measured: needle.is_force_measured,
     })
 }

@@ -165,12 +165,27 @@ def inserted(
     return np.array([skin, path])
 
 
+def best_turn(
+    block: dict, layers: list[tuple[str, float]], outer_m: float, held: tuple[float, float, float]
+) -> tuple[float, float]:
+    """Root mean square bends of the turn that was chosen, and of the best of all twentieths of the way."""
+    depth_mm = 1e3 * sum(length for _, length in layers)
+
+    def rms(at_mm: float) -> float:
+        turned = block | {"turn_at_mm": at_mm}
+        _, tip = bends(turned, layers, outer_m, held, np.random.default_rng(29), AT_ONCE)
+        return float(np.sqrt((tip**2).mean()))
+
+    return rms(block["turn_at_mm"]), min(rms(depth_mm * step / 20) for step in range(2, 20))
+
+
 def bends(
     block: dict,
     layers: list[tuple[str, float]],
     outer_m: float,
     held: tuple[float, float, float],
     random: np.random.Generator,
+    count: int | None = None,
 ) -> Array:
     """Where needles pierce the skin and where they end, towards where the tip is pushed: one patient each (2, draws).
 
@@ -178,17 +193,18 @@ def bends(
     `inserted`. Stiff tissue pushes harder, and the model is a factor on where the tip ends.
     """
     assert "measured" not in block, "no model of its own for a measured force"
+    count = count or BENDS
     stiffness = defaults("StiffnessBlock", block.get("stiffness", {}))
     forces = defaults("ForcesBlock", block.get("forces", {})) | {"wall_share": 1.0}
 
     def factor(spread: float) -> Array:
-        return spread ** random.standard_normal(BENDS)
+        return spread ** random.standard_normal(count)
 
     inner_m = 1e-3 * block["bore_mm"]
-    young = 1e9 * block["young_gpa"] * (1.0 + YOUNG_SPREAD * random.standard_normal(BENDS))
+    young = 1e9 * block["young_gpa"] * (1.0 + YOUNG_SPREAD * random.standard_normal(count))
     ei = young * np.pi / 64.0 * (outer_m**4 - inner_m**4)
     wall_n = forces["wall_n"] * factor(forces["wall_spread"]) * forces["living"] * outer_m / FORCE_OF_M
-    drawn = {"fluid": (np.zeros(BENDS), np.zeros(BENDS)), "gas": (np.zeros(BENDS), np.zeros(BENDS))}
+    drawn = {"fluid": (np.zeros(count), np.zeros(count)), "gas": (np.zeros(count), np.zeros(count))}
     for tissue, (median, stiffness_spread, share_spread) in TISSUES.items():
         k = 1e3 * stiffness[f"{tissue}_kn_m2"] * factor(stiffness_spread)
         share = forces[f"{tissue}_share"] * factor(share_spread)
@@ -196,7 +212,7 @@ def bends(
     turn_mm = block.get("turn_at_mm")
     face_m = outer_m / math.tan(math.radians(block["bevel_deg"]))
     found = []
-    for some in np.split(np.arange(BENDS), BENDS // AT_ONCE):
+    for some in np.split(np.arange(count), count // AT_ONCE):
         now = [(length, drawn[tissue][0][some], drawn[tissue][1][some]) for tissue, length in layers]
         found.append(inserted(ei[some], now, face_m, held, None if turn_mm is None else 1e-3 * turn_mm))
     skin, tip = np.concatenate(found, axis=1)

@@ -165,6 +165,9 @@ def cases(
     for given, goal in zip(scenario["goals"], report["goals"], strict=True):
         along = np.array(goal["axis"])
         target = np.array(goal["target_m"])
+        # Where a straight needle is aimed at.
+        depth = goal["insertion_length_m"] - goal["standoff_m"]
+        aim = np.array(goal["entry_m"]) + depth * along - target
         # The phantom lies where the lesion is the target.
         lesion, radius = lesions[goal["lesion"]]
         offset = turn @ np.array(given.get("target_offset_mm", [0.0, 0.0, 0.0])) * 1e-3
@@ -174,6 +177,10 @@ def cases(
         axes = np.array([towards_head, np.cross(along, towards_head), along])
         block = defaults("NeedleBlock", scenario["imperfections"].get("needle", {}))
         bends = block["model"] == "tissue" and "needle" in scenario["imperfections"]
+        blocks = scenario["imperfections"]
+        if block.get("turn_at") == "best":
+            at = {"turn_at_mm": 1e3 * goal["needle"]["turn_at_m"]}
+            blocks = blocks | {"needle": blocks["needle"] | at}
         with_budget = [
             (each, [file for file in each["files"] if file.endswith(".csv")])
             for each in goal["configurations"]
@@ -196,11 +203,13 @@ def cases(
                 times,
                 path,
                 scenario.get("engines", {}).get("timestep_ms", 1.0) * 1e-3,
-                scenario["imperfections"],
-                layers_of(goal, radius, offset) if bends else [],
+                blocks,
+                layers_of(goal, radius, offset + aim) if bends else [],
                 pushed_towards(block, axes, turn),
+                axes @ aim,
             )
-            apart = np.abs(planned(case)[1] - target).max()
+            assert block["aim"] or np.abs(aim).max() < SAME_POINT_M, goal["name"]
+            apart = np.abs(planned(case)[1] - target - aim).max()
             assert apart < SAME_POINT_M, (
                 f"{goal['name']} {each['label']}: tip {apart} m off the target"
             )

@@ -59,6 +59,7 @@ class Case:
     blocks: dict  # [imperfections], by name
     layers: list[tuple[str, float]] = field(default_factory=list)  # tissue and length, from the skin on
     pushed_towards: Array | None = None  # of a bevel of known direction: along the first two axes
+    aim: Array = field(default_factory=lambda: np.zeros(3))  # of the axis beside the target, along all three
 
 
 @dataclass
@@ -437,6 +438,9 @@ def needle_in_tissue(
     of = pickle.dumps((block, case.layers, tool.needle, held))
     if of not in KNOWN_BENDS:
         KNOWN_BENDS[of] = bending.bends(block, case.layers, tool.needle, held, np.random.default_rng(23))
+        if block.get("turn_at") == "best":
+            chosen, least = bending.best_turn(block, case.layers, tool.needle, held)
+            assert chosen < BEST_TURN * least, f"a turn leaves {chosen} m, the best {least} m"
     known = KNOWN_BENDS[of]
     # Each once, as far as there are so many.
     order = random.permutation(known.shape[1])
@@ -448,7 +452,18 @@ def needle_in_tissue(
         angle = middle + np.radians(block["bevel_spread_deg"]) * random.standard_normal(truth.count)
     towards = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
     truth.bent = bends[..., None] * towards
+    if not block["aim"]:
+        return
+    # The axis is to be aimed against the mean of what is drawn here.
+    spread = np.radians(block["bevel_spread_deg"])
+    mean = known[1].mean() * np.exp(-0.5 * spread**2) * np.append(case.pushed_towards, 0.0)
+    off = np.linalg.norm(case.aim + mean) / np.linalg.norm(mean)
+    assert off < AIM_SHARE, f"aimed by {case.aim} m against a mean bend of {mean} m"
+    truth.bent[1] += case.aim
 
+
+# What the turn that is chosen may leave beside the best, and how far an aim may be off the mean bend, as a share.
+BEST_TURN, AIM_SHARE = 1.03, 0.03
 
 # By what a goal's bends depend on: the same for all its configurations.
 KNOWN_BENDS: dict[bytes, Array] = {}

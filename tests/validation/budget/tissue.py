@@ -131,6 +131,8 @@ VARIANTS = [
     Variant("turned", 20, TISSUE + 'bevel = "left"\nturn_at_mm = 30', ["middle"], phantom="female-p5-supine"),
     Variant("fits", 22, TISSUE + 'bevel = "3:00"', ["lateral"], more=FITS, phantom="female-p5-supine"),
     Variant("stiff", 18, TISSUE + 'bevel = "posterior"', ["deep"], more=STIFF, phantom="female-p5-supine"),
+    Variant("aimed", 20, TISSUE + 'bevel = "3:00"\naim = true', ["lateral", "deep"]),
+    Variant("best", 22, TISSUE + 'bevel = "9:00"\nturn_at = "best"\naim = true', ["deep"]),
     Variant("in_air", 18, 'model = "cantilever"', ["lateral"]),
 ]
 

@@ -57,7 +57,7 @@ pub fn measure_retraction(
         |k: usize| recording.state[k].world_from_flange * cell.tool.flange_from_guide_exit;
     let first = exit_of(0).translation.vector;
     let off_axis = |point: &Vector3<f64>| {
-        let from_target = point - goal.target_m.coords;
+        let from_target = point - goal.aimed_m().coords;
         (from_target - axis * axis.dot(&from_target)).norm()
     };
     let (mut lateral_m, mut angle_rad, mut tip_m, mut at_s) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0);

@@ -30,9 +30,13 @@ pub(crate) fn needle_blocks(needle: &NeedleReport) -> Vec<Block> {
         let what = format!("turned by 180 deg at {:.0} mm", turned.at_m * 1e3);
         rms_alone(what, turned.rms_m)
     });
-    let aimed = needle
-        .aimed_rms_m
-        .map(|rms_m| rms_alone("aimed against the mean bend".to_owned(), rms_m));
+    let aimed = needle.aimed_rms_m.map(|rms_m| {
+        let what = match needle.aim_m {
+            Some(aim_m) => format!("as planned, aimed {} mm against it", one(aim_m)),
+            None => "aimed against the mean bend".to_owned(),
+        };
+        rms_alone(what, rms_m)
+    });
     let others = needle
         .alternatives
         .iter()

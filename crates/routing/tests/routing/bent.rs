@@ -246,6 +246,29 @@ fn a_needle_that_bends_towards_bone_is_refused_by_what_it_bends() {
         reason.contains("left 5th rib") && reason.contains("3.5 mm asked for"),
         "{reason}"
     );
+    // Aimed against the bend, the bent tip is where that of a straight needle was, and the straight one is beside it.
+    let aimed = TissueNeedle {
+        is_aimed: true,
+        ..needle.clone()
+    };
+    let judged = |facing| {
+        let rules = with_needle(&rules, aimed.clone(), facing);
+        judge(&anatomy, &rules, &outwards).outcome
+    };
+    let from_plate = judged(BevelFacing::Along(-Vector3::y())).unwrap();
+    let bend = from_plate.bend.unwrap();
+    let [along_m, off_m] = bend.path_m[bend.path_m.len() - 1];
+    // The median needle, aimed by the mean.
+    assert!(
+        along_m.abs() < 1e-4 && off_m.abs() < 0.1 * bend_m,
+        "{along_m} {off_m}"
+    );
+    let nearer_m = straight.distances_m[bone] - bend.distances_m[bone];
+    assert!(nearer_m < 0.3 * bend_m, "{nearer_m}");
+    let to_plate = judged(BevelFacing::Along(Vector3::y())).unwrap_err();
+    assert_eq!(to_plate.rule, RouteRule::Bent);
+    let off_m = straight.distances_m[bone] - to_plate.value - bend_m;
+    assert!(off_m.abs() < SPACING_M + 0.1 * bend_m, "{off_m}");
 }
 
 #[test]

@@ -41,7 +41,7 @@ use needlebench_robot::{LoadedRobot, LoadedTool, RobotDescription};
 
 use crate::engine_name::check_engine_names;
 use crate::fixtures::Fixture;
-use crate::scenario::{self, GoalSection, IN_IMPERFECTIONS, NeedleBlock, Scenario};
+use crate::scenario::{self, GoalSection, IN_IMPERFECTIONS, Scenario};
 use arm_values::check_brakes;
 use assumed::assume;
 pub use assumed::name_from_file;
@@ -53,7 +53,7 @@ pub use expected::Expected;
 use expected::RealThings;
 use goals::check_insertions;
 pub use goals::{BevelFacing, Expectation, Goal, Roll, RunsAlong, bevel_clock, direction};
-use goals::{BodyBoxes, Surroundings, resolve_goal};
+use goals::{BodyBoxes, InTissue, Surroundings, resolve_goal};
 pub use gravity::GravitySettings;
 use gravity::gravity_settings;
 use imperfections::Imperfections;
@@ -126,11 +126,9 @@ pub struct ResolvedScenario {
 }
 
 impl ResolvedScenario {
-    /// The block of the needle, with its key, where it bends in tissue.
-    pub(crate) fn needle_in_tissue(&self) -> Option<(&'static str, &NeedleBlock)> {
-        let expected = self.expected.as_ref()?;
-        expected.imperfections.tissue()?;
-        self.scenario.needle_in_tissue()
+    /// The needle, where it bends in tissue.
+    pub(crate) fn needle_in_tissue(&self) -> Option<InTissue<'_>> {
+        in_tissue(&self.scenario, self.expected.as_ref())
     }
 
     /// The same scenario with one of its goals alone.
@@ -513,6 +511,24 @@ pub(crate) fn resolve(
     surroundings.extend(obstacles.bodies(&scenario.obstacles));
     fixtures.extend(obstacles.fixtures());
     note_idle_criteria(&scenario, &mut notes);
+    let real = RealThings {
+        toml,
+        library,
+        robot: &robot,
+        tool: &tool,
+        base,
+        timestep_ms: scenario.engines.timestep_ms,
+        gravity_m_s2: scenario.engines.gravity_m_s2,
+        has_no_goals: with_goals && scenario.goals.is_empty(),
+    };
+    let mut real_notes = Vec::new();
+    let imperfections = scenario.imperfections.as_ref();
+    let imperfections =
+        imperfections.map(|section| real.resolve(section, IN_IMPERFECTIONS, &mut real_notes));
+    let mut imperfections = imperfections.transpose().map_err(one)?;
+    let mut expected = real
+        .expected(&scenario, imperfections.as_ref(), &mut real_notes)
+        .map_err(one)?;
     let mut goals = {
         let fixtures: Vec<CollisionBody> = surroundings
             .iter()
@@ -525,7 +541,7 @@ pub(crate) fn resolve(
             phantom: phantom.as_ref(),
             fixtures: &fixtures,
             boxes: &fixtures.iter().map(BodyBoxes::new).collect::<Vec<_>>(),
-            needle: scenario.needle_in_tissue(),
+            needle: in_tissue(&scenario, expected.as_ref()),
         };
         let (mut goals, mut findings) = (Vec::new(), Vec::new());
         for (index, section) in scenario.goals.iter().enumerate() {
@@ -589,23 +605,7 @@ pub(crate) fn resolve(
             .map_or(tool.needle.length_m, |mm| mm * 1e-3),
         hand_cone_half_angle_rad: scenario.tool.hand_cone_half_angle_deg.to_radians(),
     };
-    let real = RealThings {
-        toml,
-        library,
-        robot: &robot,
-        tool: &tool,
-        base,
-        timestep_ms: scenario.engines.timestep_ms,
-        gravity_m_s2: scenario.engines.gravity_m_s2,
-        has_no_goals: with_goals && scenario.goals.is_empty(),
-    };
-    let imperfections = scenario.imperfections.as_ref();
-    let imperfections =
-        imperfections.map(|section| real.resolve(section, IN_IMPERFECTIONS, &mut notes));
-    let mut imperfections = imperfections.transpose().map_err(one)?;
-    let mut expected = real
-        .expected(&scenario, imperfections.as_ref(), &mut notes)
-        .map_err(one)?;
+    notes.extend(real_notes);
     {
         let predicted = expected.as_mut().map(|each| &mut each.imperfections);
         let mut found: Vec<_> = imperfections
@@ -671,6 +671,17 @@ pub(crate) fn resolve(
         people,
         imperfections,
         expected,
+    })
+}
+
+/// The needle of a scenario, where it bends in tissue.
+fn in_tissue<'a>(scenario: &'a Scenario, expected: Option<&'a Expected>) -> Option<InTissue<'a>> {
+    let needle = expected?.imperfections.tissue()?;
+    let (place, block) = scenario.needle_in_tissue()?;
+    Some(InTissue {
+        place,
+        block,
+        needle,
     })
 }
 

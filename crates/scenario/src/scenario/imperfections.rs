@@ -17,7 +17,9 @@ use super::models::names_or_path;
 
 pub use measured::CovarianceMm2;
 pub(crate) use needle::{BevelFace, IN_EXPECTED, IN_IMPERFECTIONS, SIDE_FORCE_N};
-pub use needle::{ForcesBlock, MeasuredForce, NeedleBlock, NeedleModel, NeedleTip, StiffnessBlock};
+pub use needle::{
+    ForcesBlock, MeasuredForce, NeedleBlock, NeedleModel, NeedleTip, StiffnessBlock, TurnAt,
+};
 
 pub(crate) use measured::covariance_m2;
 

@@ -57,7 +57,7 @@ pub use imperfections::{
     ElasticityBlock, EncoderBlock, ExpectedSection, ForcesBlock, FrictionBlock, GuideBlock,
     HandEyeBlock, ImagingBlock, ImperfectionsSection, IndentationBlock, MeasuredForce, NeedleBlock,
     NeedleModel, NeedleTip, PayloadBlock, RegistrationBlock, SkinMarkersBlock, StiffnessBlock,
-    TorqueLimitsBlock,
+    TorqueLimitsBlock, TurnAt,
 };
 pub(crate) use imperfections::{
     BevelFace, IN_EXPECTED, IN_IMPERFECTIONS, POPULATION, SIDE_FORCE_N, covariance_m2,

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use nalgebra::Vector3;
 use needlebench_input::Finding;
 use needlebench_scenario::{Overrides, ResolvedScenario, resolve_scenario};
 
@@ -136,6 +137,27 @@ fn what_no_needle_does_is_refused_with_its_key() {
             "is turned at 400 mm, but ends",
         ),
         (
+            "model = \"cantilever\"\nturn_at = \"best\"\n",
+            "turn_at",
+            "no meaning in model `cantilever`",
+        ),
+        (
+            "turn_at = \"best\"\nturn_at_mm = 20\n",
+            "turn_at",
+            "contradicts `turn_at_mm`",
+        ),
+        (
+            "tip = \"rolled\"\nturn_at = \"best\"\n",
+            "turn_at",
+            "needs a tip that bends to one side",
+        ),
+        ("aim = true\n", "aim", "is known to bend to one side"),
+        (
+            "aim = true\ntip = \"symmetric\"\n",
+            "aim",
+            "is known to bend to one side",
+        ),
+        (
             "model = \"tissue\"\nbevel = \"spin\"\n",
             "bevel",
             "neither a direction nor a structure",
@@ -200,6 +222,85 @@ fn a_needle_through_bone_or_without_a_patient_is_refused() {
             .any(|each| each.message.contains("no patient whose tissue")),
         "{findings:#?}"
     );
+}
+
+/// The tip of the needle that is bent by its mean comes to the target, along an axis through the same entry point.
+#[test]
+fn a_needle_is_aimed_against_its_mean_bend() {
+    let block = "[expected.needle]\nbevel = \"posterior\"\nforces.wall_n = 0.3\n";
+    let straight = resolve(GOAL, block).unwrap();
+    let straight = &straight.goals[0];
+    assert_eq!(straight.aim_m.norm(), 0.0);
+    for turn in ["", "turn_at_mm = 60\n"] {
+        let resolved = resolve(GOAL, &format!("{block}aim = true\n{turn}")).unwrap();
+        let goal = &resolved.goals[0];
+        let expected = resolved.expected.as_ref().unwrap();
+        let needle = expected.imperfections.tissue().unwrap();
+        let path = goal.needle_path.as_ref().unwrap();
+        let [x, y] = needle.pushed_towards(path).unwrap();
+        let towards = goal.world_from_guide_exit.rotation * Vector3::new(x, y, 0.0);
+        assert!(towards.dot(&goal.axis).abs() < 1e-12);
+        let entry = goal.entry_m.unwrap();
+        assert!((entry - straight.entry_m.unwrap()).norm() < 1e-12);
+        let exit = goal.world_from_guide_exit.translation.vector;
+        let axis = goal.axis.into_inner();
+        assert!((exit + axis * goal.standoff_m.unwrap() - entry.coords).norm() < 1e-12);
+        let tip = exit + axis * goal.insertion_length_m;
+        assert!((tip - goal.aimed_m().coords).norm() < 1e-12);
+        let bend_m = -goal.aim_m.dot(&towards);
+        assert!((tip + towards * bend_m - goal.target_m.coords).norm() < 1e-12);
+        assert!((tip + towards * bend_m - straight.target_m.coords).norm() < 1e-12);
+        // What it is aimed against is that of the way to the target, which is nearly that of the aimed way.
+        let mean_m = needle.mean_bend_m(path, goal.standoff_m.unwrap()).unwrap();
+        assert!(bend_m.abs() > 5e-4 && (bend_m / mean_m - 1.0).abs() < 0.02);
+    }
+    let too_deep = format!("{GOAL}\ninsertion_length_mm = 130");
+    let finding = refused(
+        &too_deep,
+        "[expected.needle]\nbevel = \"3:00\"\naim = true\n",
+    );
+    assert!(
+        finding.message.contains("does not end at its target"),
+        "{finding:#?}"
+    );
+}
+
+/// A route may enter the bone that its lesion lies in. No needle is inserted through it: the model has none for it.
+#[test]
+fn a_needle_that_ends_behind_the_bone_of_its_lesion_bends_as_in_air() {
+    let any = resolve(GOAL, "").unwrap();
+    let phantom = &any.phantom.as_ref().unwrap().phantom;
+    let middle_mm = phantom.middle_of("sternum_body").unwrap().coords * 1e3;
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("nodule.obj");
+    let corners = "v 4 0 0\nv -4 0 0\nv 0 4 0\nv 0 -4 0\nv 0 0 4\nv 0 0 -4\n";
+    let faces = "f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
+    std::fs::write(&file, format!("{corners}{faces}")).unwrap();
+    let part = format!(
+        "[[phantom.parts]]\nname = \"nodule\"\ntissue = \"lesion\"\nfile = \"{}\"\n\
+         position_mm = [{}, {}, {}]\n",
+        file.display().to_string().replace('\\', "/"),
+        middle_mm.x,
+        middle_mm.y,
+        middle_mm.z
+    );
+    let within = "lesion = \"nodule\"\nentry_direction_deg = [0, 0]";
+    let resolved = resolve(within, &part).unwrap();
+    let length_mm = resolved.goals[0].insertion_length_m * 1e3;
+    let behind = format!("{within}\ninsertion_length_mm = {}", length_mm + 25.0);
+    let resolved = resolve(&behind, &part).unwrap();
+    assert_eq!(resolved.goals[0].needle_path, None);
+    let expected = resolved.expected.as_ref().unwrap();
+    assert!(expected.imperfections.tissue().is_none());
+    let mut notes = resolved.notes.iter();
+    assert!(
+        notes.any(|note| note.contains("needles bend as in air")),
+        "{:?}",
+        resolved.notes
+    );
+    let block = format!("{part}[expected.needle]\nmodel = \"tissue\"\n");
+    let finding = refused(&behind, &block);
+    assert!(finding.message.contains("meets `"), "{finding:#?}");
 }
 
 #[test]

@@ -1,18 +1,22 @@
 //! A needle that tissue bends, in the budget.
 
-use crate::common::{POSTURES, imperfect, motion_to, servo};
+use crate::common::{POSTURES, imperfect, imperfect_in_tissue, motion_to, servo};
+use needlebench_scenario::ResolvedScenario;
 use needlebench_uncertainty::Source;
 use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, Samples, budget};
 
 const SAMPLES: usize = 10_000;
 
 fn budget_of(blocks: &str) -> (ErrorBudget, Option<[f64; 2]>) {
-    let resolved = imperfect(blocks);
-    let trajectory = motion_to(&resolved, POSTURES[0], 0.1);
+    budget_in(&imperfect(blocks))
+}
+
+fn budget_in(resolved: &ResolvedScenario) -> (ErrorBudget, Option<[f64; 2]>) {
+    let trajectory = motion_to(resolved, POSTURES[0], 0.1);
     let goal = &resolved.goals[0];
-    let servo = servo(&resolved);
+    let servo = servo(resolved);
     let imperfections = resolved.imperfections.as_ref().expect("given");
-    let case = BudgetCase::of(&resolved, goal, &servo, imperfections, &trajectory);
+    let case = BudgetCase::of(resolved, goal, &servo, imperfections, &trajectory);
     let samples = Samples {
         total: SAMPLES,
         each_source: SAMPLES,
@@ -84,6 +88,59 @@ fn the_mean_bend_is_away_from_the_bevels_face() {
     assert!(unknown.total.at_target.analytic.bias().norm() < 1e-12);
     let rms_m = |found: &ErrorBudget| found.total.at_target.analytic.rms_m;
     assert!((rms_m(&unknown) / rms_m(&known) - 1.0).abs() < 1e-9);
+}
+
+/// An axis that is aimed against the mean bend has no bias left, and what is left is what a goal's answer says.
+#[test]
+fn what_is_aimed_against_is_the_mean() {
+    for more in [
+        "",
+        "turn_at_mm = 25\n",
+        "tip = \"bevel\"\nbevel_spread_deg = 40\n",
+    ] {
+        let block = format!(
+            "[imperfections.guide]\n[imperfections.needle]\nbevel = \"3:00\"\nforces.wall_n = 0.2\n{more}"
+        );
+        let of = |blocks: &str| budget_in(&imperfect_in_tissue(blocks)).0;
+        let [straight, aimed] = [of(&block), of(&format!("{block}aim = true\n"))];
+        let [before, after] = [&straight, &aimed].map(|found| &found.total.at_target.analytic);
+        let [before_m, after_m] = [before, after].map(|found| found.bias().norm());
+        // A turn leaves little to aim against.
+        let slack_m = 0.03 * before_m.max(0.3 * before.rms_m);
+        assert!(after_m < slack_m, "{more}: {before_m} {after_m}");
+        assert!(
+            after.rms_m < 1.001 * before.rms_m,
+            "{more}: {} {}",
+            after.rms_m,
+            before.rms_m
+        );
+        // Other draws through the truth of each.
+        let drawn = aimed.total.at_target;
+        let error_m = drawn.monte_carlo.expect("drawn").rms_m / (SAMPLES as f64).sqrt();
+        let bias_m = drawn.bias_difference_m.expect("drawn");
+        assert!(bias_m < 6.0 * error_m, "{more}: {bias_m}");
+        let off = drawn.covariance_difference.expect("both vary");
+        assert!(off < 0.12, "{more}: {off}");
+    }
+}
+
+/// The depth that is chosen for a turn leaves hardly more than the best of all that are drawn.
+#[test]
+fn the_best_turn_is_that_of_all_draws() {
+    for gauge_force in ["0.085", "0.3"] {
+        let block = format!(
+            "[imperfections.guide]\n[imperfections.needle]\nforces.wall_n = {gauge_force}\n"
+        );
+        let rms_m = |more: &str| {
+            let (found, _) = budget_of(&format!("{block}{more}"));
+            found.total.at_target.analytic.rms_m
+        };
+        let least_m = (1..=12)
+            .map(|step| rms_m(&format!("turn_at_mm = {}\n", 4 * step)))
+            .fold(f64::INFINITY, f64::min);
+        let chosen_m = rms_m("turn_at = \"best\"\n");
+        assert!(chosen_m < 1.03 * least_m, "{chosen_m} {least_m}");
+    }
 }
 
 /// A turn on the way, a rolled bevel and a symmetric tip bend less, as the sources of their coefficients say.

@@ -43,11 +43,12 @@ PLAN.routeRows = (columns, caption) => {
   if (columns.some(({ route }) => route?.bend))
     row('Bend of the median needle', 'mm', ({ bend }) => {
       if (!bend) return '\u2013';
-      const [, off] = bend.path_m[bend.path_m.length - 1];
+      const off = bend.tip_m;
       const side = bend.towards
         ? `towards ${PLAN.towards(bend.towards.map((value) => value * Math.sign(off)))}`
         : 'to a side that is not known';
-      return `${NB.mm(Math.abs(off))} ${side}${bend.is_force_measured ? '' : ' (forces assumed)'}`;
+      const aimed = bend.is_aimed ? ', the guide aimed against it' : '';
+      return `${NB.mm(Math.abs(off))} ${side}${aimed}${bend.is_force_measured ? '' : ' (forces assumed)'}`;
     });
   row('Angle to skin normal', '\u00b0', (route) => NB.deg(route.skin_angle_rad));
   row('Angle to axial plane', '\u00b0', (route) => NB.deg(route.axial_angle_rad));

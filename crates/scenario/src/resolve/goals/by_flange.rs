@@ -1,14 +1,13 @@
 //! Goals by a pose of the flange.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_input::{Finding, TomlText};
 use needlebench_kinematics::{Pose, pose_from_rotation_vector};
 
 use super::checks::{true_target, unseen_entry};
-use super::needle_path::needle_path;
+use super::needle_path::with_needle;
 use super::{Goal, Roll, Surroundings};
 use crate::scenario::GoalSection;
 
@@ -113,16 +112,24 @@ pub(super) fn from_flange_pose(
         approach_m: section.approach_mm * 1e-3,
         lesion: None,
         target_organ,
+        aim_m: Vector3::zeros(),
         needle_path: None,
         expected: BTreeMap::new(),
     };
-    if let Some((place, block)) = surroundings.needle {
+    if let Some(tissue) = surroundings.needle {
+        if tissue.needle.is_aimed {
+            let message = format!(
+                "the axis of goal `{}` is given by its `flange_pose`",
+                goal.name
+            );
+            let finding = text.finding(&format!("{}.aim", tissue.place), message);
+            return Err(finding.hint("leave `aim` out, or give the goal an entry and a target"));
+        }
         let placed = surroundings.phantom;
         let to_phantom =
             placed.map_or_else(Pose::identity, |placed| placed.world_from_phantom.inverse());
         let phantom = placed.map(|placed| &*placed.phantom);
-        let path = needle_path(text, place, block, phantom, &goal, &to_phantom)?;
-        goal.needle_path = path.map(Arc::new);
+        goal = with_needle(text, tissue, phantom, goal, &to_phantom)?;
     }
     Ok(goal)
 }

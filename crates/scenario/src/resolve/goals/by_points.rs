@@ -1,7 +1,6 @@
 //! Goals by entry and target.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_input::{Finding, TomlText, nearest_name};
@@ -9,7 +8,7 @@ use needlebench_kinematics::Pose;
 use needlebench_phantom::Phantom;
 
 use super::checks::{true_target, unseen_entry};
-use super::needle_path::needle_path;
+use super::needle_path::with_needle;
 use super::{Goal, Roll, Surroundings};
 use crate::scenario::GoalSection;
 
@@ -30,6 +29,7 @@ impl GoalInPhantom {
             entry_m: goal.entry_m.map(|entry| world_from_phantom * entry),
             target_m: world_from_phantom * goal.target_m,
             true_target_m: goal.true_target_m.map(|at| world_from_phantom * at),
+            aim_m: world_from_phantom.rotation * goal.aim_m,
             axis: UnitVector3::new_normalize(axis),
             world_from_guide_exit: world_from_phantom * goal.world_from_guide_exit,
             ..goal.clone()
@@ -158,12 +158,12 @@ pub(super) fn from_entry_and_target(
         approach_m: section.approach_mm * 1e-3,
         target_organ: phantom.organ_at(&target),
         lesion,
+        aim_m: Vector3::zeros(),
         needle_path: None,
         expected: BTreeMap::new(),
     };
-    if let Some((place, block)) = surroundings.needle {
-        let path = needle_path(text, place, block, Some(phantom), &goal, &Pose::identity())?;
-        goal.needle_path = path.map(Arc::new);
+    if let Some(tissue) = surroundings.needle {
+        goal = with_needle(text, tissue, Some(phantom), goal, &Pose::identity())?;
     }
     Ok(GoalInPhantom(goal))
 }

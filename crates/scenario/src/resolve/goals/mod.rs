@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::imperfections::{NeedlePath, TissueNeedle, bends_along_m};
 use super::phantom::{Corners, PlacedPhantom};
-use crate::scenario::{EVERY_CONFIGURATION, GoalSection, NeedleBlock};
+use crate::scenario::{EVERY_CONFIGURATION, GoalSection};
 use by_flange::from_flange_pose;
 pub(crate) use by_points::GoalInPhantom;
 pub use by_points::direction;
@@ -26,7 +26,7 @@ use by_points::from_entry_and_target;
 pub(crate) use by_points::target_inside;
 use checks::{check_place, check_target};
 pub use needle_path::{BevelFacing, RunsAlong, bevel_clock};
-pub(crate) use needle_path::{bevel_facing, check_insertions};
+pub(crate) use needle_path::{InTissue, bevel_facing, check_insertions};
 
 /// Angle of the guide about the needle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -59,6 +59,9 @@ pub struct Goal {
     pub target_m: Point3<f64>,
     /// Where the lesion really is, if that is known; nothing is planned by it.
     pub true_target_m: Option<Point3<f64>>,
+    /// How far beside the target the straight needle is aimed, so that the tip of the bent one comes to it, m; lateral to
+    /// [`Goal::axis`], zero without `aim`.
+    pub aim_m: Vector3<f64>,
     /// Direction of insertion.
     pub axis: UnitVector3<f64>,
     /// Pose of the guide's exit at roll 0; z is [`Goal::axis`].
@@ -105,8 +108,13 @@ impl Goal {
         let path = self.needle_path.as_ref()?;
         let towards = needle.pushed_towards(path)?;
         let stand_off_m = self.standoff_m.unwrap_or(0.0);
-        let inserted = needle.insert(&needle.medians(), path, stand_off_m).ok()?;
+        let inserted = needle.insert_median(path, stand_off_m).ok()?;
         Some(self.bent_line(&bends_along_m(&inserted), towards))
+    }
+
+    /// Where the tip of a straight needle is to come.
+    pub fn aimed_m(&self) -> Point3<f64> {
+        self.target_m + self.aim_m
     }
 
     /// Length of the planned needle in the patient, m; `None` without a phantom.
@@ -123,8 +131,8 @@ pub(crate) struct Surroundings<'a> {
     pub fixtures: &'a [CollisionBody],
     /// Boxes around each of the fixtures.
     pub boxes: &'a [BodyBoxes],
-    /// A needle that bends in tissue, with the key of its block.
-    pub needle: Option<(&'static str, &'a NeedleBlock)>,
+    /// A needle that bends in tissue.
+    pub needle: Option<InTissue<'a>>,
 }
 
 /// Boxes around a body and its solids, along the world's axes.

@@ -1,6 +1,8 @@
 //! What a needle passes on its way to a goal, and to which side it bends.
 
-use nalgebra::{Point3, Vector3};
+use std::sync::Arc;
+
+use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_input::{Finding, TomlText, nearest_name};
 use needlebench_kinematics::Pose;
 use needlebench_phantom::{Phantom, Tissue};
@@ -8,7 +10,7 @@ use needlebench_phantom::{Phantom, Tissue};
 use needlebench_insertion::WARNED_SLOPE;
 
 use super::Goal;
-use crate::resolve::imperfections::{Imperfections, NeedlePath, TissueNeedle};
+use crate::resolve::imperfections::{Aim, Imperfections, NeedlePath, TissueNeedle};
 use crate::resolve::phantom::PlacedPhantom;
 use crate::scenario::{BevelFace, NeedleBlock, Scenario};
 
@@ -112,12 +114,87 @@ pub(crate) fn bevel_facing(
     })
 }
 
-/// The way of a goal's needle through a phantom; the goal is in the frame that `to_phantom` is from. None where it is not
-/// known and nothing in the block asks for it.
-pub(super) fn needle_path(
+/// A needle that bends in tissue, with its block and the key of that.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InTissue<'a> {
+    pub place: &'a str,
+    pub block: &'a NeedleBlock,
+    pub needle: &'a TissueNeedle,
+}
+
+/// The goal, in the frame that `to_phantom` is from, with the way of its needle through the phantom, and with its axis aimed
+/// against the bend if that is asked for. It has no way where that is not known and nothing in the block asks for it.
+pub(super) fn with_needle(
     text: &TomlText<'_>,
-    place: &str,
-    block: &NeedleBlock,
+    tissue: InTissue<'_>,
+    phantom: Option<&Phantom>,
+    mut goal: Goal,
+    to_phantom: &Pose,
+) -> Result<Goal, Finding> {
+    goal.needle_path = needle_path(text, tissue, phantom, &goal, to_phantom)?.map(Arc::new);
+    let InTissue { place, needle, .. } = tissue;
+    if !needle.is_aimed {
+        return Ok(goal);
+    }
+    let aimed = |message: String, hint: &str| {
+        let message = format!("goal `{}`: {message}", goal.name);
+        text.finding(&format!("{place}.aim"), message).hint(hint)
+    };
+    let (Some(path), Some(entry)) = (goal.needle_path.as_deref(), goal.entry_m) else {
+        return Ok(goal);
+    };
+    let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+    let bend_m = needle.mean_bend_m(path, stand_off_m).map_err(|error| {
+        let message = format!("its needle cannot be inserted: {error}");
+        aimed(message, "leave `aim` out")
+    })?;
+    let tip_m = goal.insertion_length_m - stand_off_m;
+    let to_target = goal.target_m - entry;
+    if (tip_m - to_target.norm()).abs() > ENDS_AT_TARGET_M {
+        let message = "its needle does not end at its target".to_owned();
+        return Err(aimed(message, "leave `insertion_length_mm` out, or `aim`"));
+    }
+    let Some([x, y]) = needle.pushed_towards(path) else {
+        return Ok(goal);
+    };
+    let towards = goal.world_from_guide_exit.rotation * Vector3::new(x, y, 0.0);
+    let Some(aim) = Aim::new(tip_m, bend_m) else {
+        let message = format!("its needle bends by {:.0} mm", bend_m * 1e3);
+        return Err(aimed(message, "a stiffer needle, or leave `aim` out"));
+    };
+    let tilt = UnitQuaternion::from_axis_angle(
+        &UnitVector3::new_normalize(goal.axis.cross(&towards)),
+        -aim.tilt_rad,
+    );
+    let rotation = tilt * goal.world_from_guide_exit.rotation;
+    let axis = tilt * goal.axis;
+    let exit = entry - axis.into_inner() * stand_off_m;
+    let aimed = Goal {
+        axis,
+        world_from_guide_exit: Pose::from_parts(exit.into(), rotation),
+        insertion_length_m: stand_off_m + aim.tip_m,
+        aim_m: tilt * towards * -bend_m,
+        ..goal
+    };
+    // What is passed on the aimed way; the side that the bevel looks to stays.
+    let path = needle_path(text, tissue, phantom, &aimed, to_phantom)?;
+    Ok(Goal {
+        needle_path: path.map(Arc::new),
+        ..aimed
+    })
+}
+
+/// Difference of the depths of tip and target that is rounding, m.
+const ENDS_AT_TARGET_M: f64 = 1e-6;
+
+/// The way of a goal's needle through a phantom.
+fn needle_path(
+    text: &TomlText<'_>,
+    InTissue {
+        place,
+        block,
+        needle,
+    }: InTissue<'_>,
     phantom: Option<&Phantom>,
     goal: &Goal,
     to_phantom: &Pose,
@@ -173,11 +250,12 @@ pub(super) fn needle_path(
         let turned = to_guide * direction;
         [turned.x, turned.y]
     };
-    Ok(Some(NeedlePath::new(
+    let path = NeedlePath::new(
         layers,
         pushed_towards.map(in_guide),
         bevel_clock(&entry, &tip).map(in_guide),
-    )))
+    );
+    Ok(Some(needle.turned(path, goal.standoff_m.unwrap_or(0.0))))
 }
 
 /// Where a goal's needle ends, in the goal's frame.
@@ -227,6 +305,17 @@ pub(crate) fn check_insertions(
     Ok(())
 }
 
+/// The bones that a place in the world is in.
+fn bones_around<'p>(
+    placed: &'p PlacedPhantom,
+    place: &Point3<f64>,
+) -> impl Iterator<Item = &'p str> {
+    let at = placed.world_from_phantom.inverse() * place;
+    let parts = placed.phantom.parts.iter();
+    let around = parts.filter(move |part| part.tissue == Tissue::Bone && part.solid.contains(&at));
+    around.map(|part| part.organ.as_ref().unwrap_or(&part.name).as_str())
+}
+
 /// Inserts the median needle of a goal: what is to be noted, or why it cannot be inserted. A goal whose way is not known has
 /// no needle to insert where it is refused for the bone in it.
 fn inserted(
@@ -242,7 +331,15 @@ fn inserted(
         });
         let is_refused = ways.is_some_and(|(placed, [entry, tip])| {
             let mut bones = placed.phantom.bones_met(&entry, &tip);
+            // A route may enter the bone that its lesion is in.
+            let holding: Vec<&str> = match goal.lesion {
+                Some(_) => bones_around(placed, &goal.target_m).collect(),
+                None => Vec::new(),
+            };
             bones.any(|bone| {
+                if holding.contains(&bone.organ.as_ref().unwrap_or(&bone.name).as_str()) {
+                    return false;
+                }
                 let called = [Some(&bone.name), bone.organ.as_ref()];
                 let is_called = |name: &String| called.contains(&Some(name)) || name == BONE;
                 !off.iter().any(is_called)
@@ -258,7 +355,7 @@ fn inserted(
         };
     };
     let stand_off_m = goal.standoff_m.unwrap_or(0.0);
-    let inserted = needle.insert(&needle.medians(), path, stand_off_m);
+    let inserted = needle.insert_median(path, stand_off_m);
     let inserted = inserted.map_err(|error| format!("goal `{}`: {error}", goal.name))?;
     let slope = inserted.largest_slope();
     Ok((slope > WARNED_SLOPE).then(|| {

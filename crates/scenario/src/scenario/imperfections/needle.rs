@@ -34,6 +34,14 @@ pub enum NeedleTip {
     Rolled,
 }
 
+/// Where a needle is turned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TurnAt {
+    /// By 180 degrees at the twentieth of its way, from a fifth on, that leaves the least root mean square bend.
+    Best,
+}
+
 /// Needle bending by a lateral force at the tip, caused by the bevel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -68,6 +76,11 @@ pub struct NeedleBlock {
     /// Depth behind the skin at which the needle is turned by 180 degrees, mm. Default: never.
     #[schemars(range(min = 0.0, max = 500.0))]
     pub turn_at_mm: Option<f64>,
+    /// The depth of the turn, for each goal: instead of `turn_at_mm`.
+    pub turn_at: Option<TurnAt>,
+    /// Whether the guide is tilted about the entry point so that the mean tip of the bent needle comes to the target, not that
+    /// of a straight one; for a bevel of known direction. The straight needle keeps its margins all the same.
+    pub aim: bool,
     /// Forces across the tip.
     pub forces: ForcesBlock,
     /// Stiffnesses of the tissues.
@@ -140,6 +153,8 @@ impl Default for NeedleBlock {
             bevel: UNKNOWN.to_owned(),
             bevel_spread_deg: 10.0,
             turn_at_mm: None,
+            turn_at: None,
+            aim: false,
             forces: ForcesBlock::default(),
             stiffness: StiffnessBlock::default(),
             measured: None,
@@ -251,6 +266,8 @@ impl NeedleBlock {
                 self.bevel_spread_deg != usual.bevel_spread_deg,
             ),
             ("turn_at_mm", self.turn_at_mm.is_some()),
+            ("turn_at", self.turn_at.is_some()),
+            ("aim", self.aim),
             ("forces", self.forces != usual.forces),
             ("stiffness", self.stiffness != usual.stiffness),
             ("measured", self.measured.is_some()),
@@ -289,12 +306,26 @@ impl NeedleBlock {
             let keys = [
                 ("bevel", self.bevel != usual.bevel),
                 ("turn_at_mm", self.turn_at_mm.is_some()),
+                ("turn_at", self.turn_at.is_some()),
             ];
             for (key, _) in keys.into_iter().filter(|(_, is_given)| *is_given) {
                 let message = format!("`{key}` needs a tip that bends to one side");
                 let finding = toml.finding(&format!("{place}.{key}"), message);
                 findings.push(finding.hint("`tip = \"bevel\"`"));
             }
+        }
+        if self.turn_at.is_some() && self.turn_at_mm.is_some() {
+            let message = "`turn_at` contradicts `turn_at_mm`";
+            let finding = toml.finding(&format!("{place}.turn_at"), message);
+            findings.push(finding.hint("a depth of one's own, or the best"));
+        }
+        if self.aim && (self.bevel.trim() == UNKNOWN || !has_direction) {
+            let message = "`aim` needs a needle that is known to bend to one side";
+            let finding = toml.finding(&format!("{place}.aim"), message);
+            findings.push(
+                finding
+                    .hint("`tip = \"bevel\"` with `bevel`: where its face looks, such as `3:00`"),
+            );
         }
         let contradicts = [
             ("wall_n", self.forces.wall_n != usual.forces.wall_n),

@@ -42,16 +42,28 @@ pub const POSTURES: [Joints; 2] = [
 
 /// table3 with these imperfections.
 pub fn imperfect(blocks: &str) -> ResolvedScenario {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
-    let path = folder.join("table3.toml");
+    resolved("scenarios/table3.toml", |text| format!("{text}\n{blocks}"))
+}
+
+/// A goal by entry and target, with these imperfections.
+pub fn imperfect_in_tissue(blocks: &str) -> ResolvedScenario {
+    resolved("guide/examples/tissue.toml", |text| {
+        let (cell, _) = text
+            .split_once("[expected.needle]")
+            .expect("it has a needle");
+        format!("{cell}\n{blocks}")
+    })
+}
+
+fn resolved(file: &str, change: impl Fn(&str) -> String) -> ResolvedScenario {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .join(file);
     let text = std::fs::read_to_string(&path).expect("the shipped scenario is there");
-    resolve_scenario(
-        &path.display().to_string(),
-        &format!("{text}\n{blocks}"),
-        &folder,
-        &Overrides::default(),
-    )
-    .expect("the blocks are sound")
+    let folder = path.parent().expect("in a folder");
+    let file = path.display().to_string();
+    resolve_scenario(&file, &change(&text), folder, &Overrides::default())
+        .expect("the blocks are sound")
 }
 
 pub fn servo(resolved: &ResolvedScenario) -> Servo {
