@@ -247,6 +247,7 @@ const LAYERS: [(&str, &[&str]); 38] = [
     (
         "needlebench",
         &[
+            "breath",
             "insertion",
             "iso9283",
             "credibility",
