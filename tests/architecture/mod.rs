@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Every crate under `crates/`, the Python package, and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 37] = [
+const LAYERS: [(&str, &[&str]); 38] = [
     ("elementary", &[]),
     ("parallel", &[]),
     ("numerics", &[]),
@@ -69,6 +69,7 @@ const LAYERS: [(&str, &[&str]); 37] = [
     ),
     ("study", &["scenario", "input", "kinematics", "numerics"]),
     ("ros", &[]),
+    ("breath", &["ros", "input", "numerics"]),
     ("urscript", &["kinematics"]),
     (
         "recorded",
@@ -246,6 +247,7 @@ const LAYERS: [(&str, &[&str]); 37] = [
     (
         "needlebench",
         &[
+            "breath",
             "insertion",
             "iso9283",
             "credibility",

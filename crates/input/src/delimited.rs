@@ -49,6 +49,21 @@ impl Separator {
         self != Self::Comma
     }
 
+    /// The number in a cell; not a number where it is empty, `none` or `null`. `None` for what is none.
+    pub fn number(self, cell: &str) -> Option<f64> {
+        match cell.parse() {
+            Ok(value) => Some(value),
+            Err(_) if cell.is_empty() => Some(f64::NAN),
+            Err(_) if self.allows_decimal_comma() && cell.contains(',') => {
+                cell.replace(',', ".").parse().ok()
+            }
+            Err(_) if cell.eq_ignore_ascii_case("none") || cell.eq_ignore_ascii_case("null") => {
+                Some(f64::NAN)
+            }
+            Err(_) => None,
+        }
+    }
+
     /// Cells of a line, without blanks and quotes around them. What stands in quotes is one cell.
     pub fn cells(self, line: &str) -> impl Iterator<Item = &str> {
         let has_quotes = line.contains('"');
@@ -84,6 +99,16 @@ mod tests {
         assert_eq!(cells("  a  b\tc "), ["a  b", "c"]);
         assert_eq!(cells("  a  b c "), ["a", "b", "c"]);
         assert_eq!(cells(""), [""; 0]);
+    }
+
+    #[test]
+    fn a_comma_is_a_decimal_comma_where_commas_part_nothing() {
+        assert_eq!(Separator::Semicolon.number("-1,5"), Some(-1.5));
+        assert_eq!(Separator::Comma.number("-1,5"), None);
+        assert_eq!(Separator::Comma.number("2.5e-3"), Some(2.5e-3));
+        assert!(Separator::Tab.number("").is_some_and(f64::is_nan));
+        assert!(Separator::Tab.number("NULL").is_some_and(f64::is_nan));
+        assert_eq!(Separator::Tab.number("1,2,3"), None);
     }
 
     #[test]

@@ -11,12 +11,13 @@ use needlebench_parallel::Progress;
 
 use crate::clock;
 use crate::command::{
-    self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, CtArguments,
-    DOCTOR_HELP, DoctorArguments, ExportArguments, FkArguments, ISO9283_HELP, IkArguments,
-    InitArguments, Iso9283Arguments, JUDGE_HELP, JudgeArguments, MergeArguments, NeedleArguments,
-    PairsArguments, PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
-    ReportArguments, RunArguments, SEARCH_HELP, STUDY_HELP, SchemaFormat, SearchArguments,
-    ServoArguments, StudyArguments, SuggestArguments, VIEW_HELP, ViewArguments,
+    self, AtlasArguments, BREATH_HELP, BreathArguments, CheckArguments, ClearanceArguments,
+    CompareArguments, CtArguments, DOCTOR_HELP, DoctorArguments, ExportArguments, FkArguments,
+    ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, JUDGE_HELP, JudgeArguments,
+    MergeArguments, NeedleArguments, PairsArguments, PaperArguments, REPLAY_HELP, REPORT_HELP,
+    RecordPlanArguments, ReplayArguments, ReportArguments, RunArguments, SEARCH_HELP, STUDY_HELP,
+    SchemaFormat, SearchArguments, ServoArguments, StudyArguments, SuggestArguments, VIEW_HELP,
+    ViewArguments,
 };
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
@@ -145,6 +146,12 @@ enum Command {
     /// Insert a needle into tissue by itself; find the force across its tip from recorded bends.
     #[command(after_help = "Example: needlebench needle insert guide/examples/needle.toml")]
     Needle(NeedleArguments),
+    /// Read recordings of breath: amplitude, period, level, drift and time within a window, each with its interval.
+    #[command(
+        after_help = "Example: needlebench breath guide/examples/breath.csv",
+        after_long_help = BREATH_HELP
+    )]
+    Breath(BreathArguments),
     /// List collision pairs, enabled or disabled, with reasons; check an SRDF.
     #[command(after_help = "Example: needlebench pairs scenarios/table3.toml --srdf arm.srdf")]
     Pairs(PairsArguments),
@@ -278,6 +285,7 @@ fn carried_out(command: Command) -> Result<ExitStatus, Failure> {
         Command::Replay(arguments) => command::replay(&arguments),
         Command::Judge(arguments) => command::judge(&arguments),
         Command::Needle(arguments) => command::needle(&arguments),
+        Command::Breath(arguments) => command::breath(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Servo(arguments) => command::servo(&arguments),
         Command::Report(arguments) => command::report(&arguments),

@@ -286,7 +286,7 @@ impl Reader<'_> {
             last_is_empty = cell.is_empty();
             let Some(at) = at else { continue };
             let slot = &table.slots[at];
-            let value = number(cell, table.separator.allows_decimal_comma());
+            let value = table.separator.number(cell);
             if value.is_none() && self.findings.len() < MOST_FINDINGS {
                 let mut finding = Finding::new(self.file, format!("`{cell}` is not a number"))
                     .key(table.names[slot.column])
@@ -474,18 +474,5 @@ impl Reader<'_> {
             self.findings.push(Finding::new(&map.file, message));
         }
         slots
-    }
-}
-
-/// A number; not a number where a cell is empty. `None` for what is none.
-fn number(cell: &str, decimal_comma: bool) -> Option<f64> {
-    match cell.parse() {
-        Ok(value) => Some(value),
-        Err(_) if cell.is_empty() => Some(f64::NAN),
-        Err(_) if decimal_comma && cell.contains(',') => cell.replace(',', ".").parse().ok(),
-        Err(_) if cell.eq_ignore_ascii_case("none") || cell.eq_ignore_ascii_case("null") => {
-            Some(f64::NAN)
-        }
-        Err(_) => None,
     }
 }

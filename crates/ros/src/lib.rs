@@ -10,4 +10,4 @@ mod container;
 pub mod message;
 
 pub use container::{Logged, McapWriter, ReadError, WriteError, is_mcap, messages};
-pub use message::{JointState, Message, NotAMessage, Stamp};
+pub use message::{JointState, Message, NotAMessage, Point, PointStamped, Stamp};

@@ -137,6 +137,79 @@ impl Message for JointState {
     }
 }
 
+/// Three coordinates, m.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// Along x.
+    pub x: f64,
+    /// Along y.
+    pub y: f64,
+    /// Along z.
+    pub z: f64,
+}
+
+/// `geometry_msgs/msg/PointStamped`: where a point is.
+#[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PointStamped {
+    /// When, and the frame of the coordinates.
+    #[serde(default)]
+    pub header: Header,
+    /// The coordinates.
+    pub point: Point,
+}
+
+/// `geometry_msgs/msg/PoseStamped` as JSON, without what follows the position.
+#[derive(Deserialize)]
+struct PoseStamped {
+    #[serde(default)]
+    header: Header,
+    pose: Position,
+}
+
+#[derive(Deserialize)]
+struct Position {
+    position: Point,
+}
+
+impl PointStamped {
+    /// Types of messages that [`PointStamped::decode`] reads, without their package.
+    pub const READ_OF: [&str; 2] = ["PointStamped", "PoseStamped"];
+
+    /// The position in the bytes of a `PointStamped` or `PoseStamped`, in an encoding: `json` or `cdr`.
+    ///
+    /// # Errors
+    /// [`NotAMessage`].
+    pub fn decode(encoding: &str, data: &[u8]) -> Result<Self, NotAMessage> {
+        match encoding {
+            "json" => serde_json::from_slice(data).or_else(|error| {
+                let Ok(PoseStamped { header, pose }) = serde_json::from_slice(data) else {
+                    return Err(error.into());
+                };
+                let point = pose.position;
+                Ok(Self { header, point })
+            }),
+            // The orientation of a pose comes after its position.
+            "cdr" => cdr::decode(data).ok_or(NotAMessage::CutOff),
+            other => Err(NotAMessage::Encoding(other.to_owned())),
+        }
+    }
+}
+
+impl Message for PointStamped {
+    const TYPE: &'static str = "geometry_msgs/msg/PointStamped";
+
+    fn definition() -> String {
+        with_types(
+            "std_msgs/Header header\ngeometry_msgs/Point point\n",
+            &[
+                HEADER,
+                TIME,
+                ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"),
+            ],
+        )
+    }
+}
+
 /// `std_msgs/msg/String`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Text(pub String);
@@ -232,5 +305,35 @@ mod tests {
             (12, 345)
         );
         assert!(JointState::decode("cdr", &state.to_cdr()[..70]).is_err());
+    }
+    #[test]
+    fn positions_are_read_from_points_and_from_poses() {
+        let header = Header {
+            stamp: Stamp::of_ns(1_500_000_000),
+            frame_id: "tracker".to_owned(),
+        };
+        let point = Point {
+            x: 0.1,
+            y: -2.0,
+            z: 3.5,
+        };
+        let stamped = PointStamped { header, point };
+        let bytes = stamped.to_cdr();
+        assert_eq!(PointStamped::decode("cdr", &bytes).unwrap(), stamped);
+        assert!(PointStamped::decode("cdr", &bytes[..bytes.len() - 1]).is_err());
+        // A pose goes on with its orientation.
+        let pose = (&stamped, [0.0, 0.0, 0.0, 1.0]);
+        let pose = PointStamped::decode("cdr", &cdr::encode(&pose)).unwrap();
+        assert_eq!(pose, stamped);
+        let place = r#"{"x": 0.1, "y": -2, "z": 3.5}"#;
+        for message in [
+            format!(r#"{{"point": {place}}}"#),
+            format!(r#"{{"pose": {{"position": {place}, "orientation": {{}}}}}}"#),
+        ] {
+            let read = PointStamped::decode("json", message.as_bytes()).unwrap();
+            assert_eq!(read.point, point);
+        }
+        assert!(PointStamped::decode("json", b"{}").is_err());
+        assert!(PointStamped::decode("ros1", &[]).is_err());
     }
 }

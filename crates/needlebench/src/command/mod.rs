@@ -1,6 +1,7 @@
 //! The commands.
 
 mod atlas;
+mod breath;
 mod check;
 mod clearance;
 mod compare;
@@ -37,6 +38,7 @@ use needlebench_scenario::{EntryChooser, Overrides, ResolvedScenario, load_scena
 use serde::Serialize;
 
 pub(crate) use atlas::{AtlasArguments, atlas};
+pub(crate) use breath::{BREATH_HELP, BreathArguments, breath};
 pub(crate) use check::{CheckArguments, check};
 pub(crate) use clearance::{ClearanceArguments, clearance};
 pub(crate) use compare::{CompareArguments, compare, compare_help};

@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, Json, has_keys, holds, mujoco_is_ready};
 
-const COMMANDS: [&str; 24] = [
+const COMMANDS: [&str; 25] = [
     "init",
     "suggest",
     "run",
@@ -19,6 +19,7 @@ const COMMANDS: [&str; 24] = [
     "plan-excitation",
     "replay",
     "needle",
+    "breath",
     "pairs",
     "paper",
     "report",

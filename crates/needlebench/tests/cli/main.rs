@@ -5,6 +5,7 @@ mod accuracy;
 mod action;
 mod arms;
 mod atlas;
+mod breath;
 mod calibration;
 #[cfg(unix)]
 mod cases;
