@@ -1,0 +1,35 @@
+//! How likely a needle meets a structure or reaches the lesion: *of the model*, never of a patient.
+//!
+//! ```text
+//! Law   entry and tip together, bend, breath          what is known of one needle, in its own frame
+//!   +--> draw          one needle in one patient
+//! ```
+//!
+//! # Frame
+//!
+//! x along the planned needle from the planned entry point (0, 0, 0) to the planned tip (depth, 0, 0); y and z lateral.
+//! Metres. What moves with the chest wall and what moves with the lung are seen from the body that they move with: the
+//! path of a draw relative to a body is the planned path plus
+//!
+//! ```text
+//! e(s) = (1 - s) e_entry + s e_tip + bend(s) - displacement of the body,   s = depth / planned depth
+//! ```
+//!
+//! # Draws
+//!
+//! Draw i is a function of the seed and i alone: the same for every law, structure and number of threads. Two laws, two
+//! entries or two configurations are thus compared on the same arms, patients and needles.
+
+mod bend;
+mod breath;
+mod draw;
+mod error;
+mod interval;
+mod law;
+
+pub use bend::{Bend, BendDirection};
+pub use breath::{Body, Hold};
+pub use draw::{PathDraw, draw};
+pub use error::LawError;
+pub use interval::{CONFIDENCE, Difference, Interval, share_interval, weighted_interval};
+pub use law::{Law, Part};
