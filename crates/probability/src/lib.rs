@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! Law   entry and tip together, bend, breath          what is known of one needle, in its own frame
-//!   +--> draw          one needle in one patient
+//!   |       + Needle, Structure, Anatomy = Case       where it goes, and how far anything is from a point
+//!   +--> at_most       an upper bound without sampling, given the law
 //! ```
 //!
 //! # Frame
@@ -21,15 +22,24 @@
 //! entries or two configurations are thus compared on the same arms, patients and needles.
 
 mod bend;
+mod bound;
 mod breath;
+mod case;
 mod draw;
 mod error;
+mod event;
 mod interval;
 mod law;
+mod least;
+mod planes;
 
 pub use bend::{Bend, BendDirection};
+pub use bound::{Bound, BoundKind, at_most};
 pub use breath::{Body, Hold};
+pub use case::{Anatomy, Case, CaseError, Needle, Structure};
 pub use draw::{PathDraw, draw};
 pub use error::LawError;
+pub use event::Event;
 pub use interval::{CONFIDENCE, Difference, Interval, share_interval, weighted_interval};
 pub use law::{Law, Part};
+pub use planes::HalfPlane;
