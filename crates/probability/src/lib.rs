@@ -4,6 +4,8 @@
 //! Law   entry and tip together, bend, breath          what is known of one needle, in its own frame
 //!   |       + Needle, Structure, Anatomy = Case       where it goes, and how far anything is from a point
 //!   +--> at_most       an upper bound without sampling, given the law
+//!   +--> estimate      counts of draws with a 95 % interval, the rare ones by importance sampling
+//!   +--> difference    two cases on the same draws, paired
 //! ```
 //!
 //! # Frame
@@ -27,11 +29,17 @@ mod breath;
 mod case;
 mod draw;
 mod error;
+mod estimate;
 mod event;
+mod importance;
+mod influence;
 mod interval;
 mod law;
 mod least;
 mod planes;
+#[cfg(test)]
+mod tests;
+mod words;
 
 pub use bend::{Bend, BendDirection};
 pub use bound::{Bound, BoundKind, at_most};
@@ -39,7 +47,12 @@ pub use breath::{Body, Hold};
 pub use case::{Anatomy, Case, CaseError, Needle, Structure};
 pub use draw::{PathDraw, draw};
 pub use error::LawError;
+pub use estimate::{
+    Draws, Estimate, EstimateError, MOST_DRAWS, Method, Told, difference, estimate,
+};
 pub use event::Event;
+pub use influence::{Influence, Origin};
 pub use interval::{CONFIDENCE, Difference, Interval, share_interval, weighted_interval};
 pub use law::{Law, Part};
 pub use planes::HalfPlane;
+pub use words::{LEAST_PRINTED, bound_label, estimate_label};

@@ -1,9 +1,13 @@
 //! What cannot be a law, a case or a question is answered by an error that names it.
 
-use nalgebra::{Matrix6, Vector2, Vector3, Vector6};
-use needlebench_probability::{Bend, BendDirection, Hold, Law, LawError};
+use nalgebra::{Matrix6, Point3, Vector2, Vector3, Vector6};
+use needlebench_probability::{
+    Anatomy, Bend, BendDirection, Body, Case, CaseError, Draws, EstimateError, Event, HalfPlane,
+    Hold, Law, LawError, Needle, estimate,
+};
 
-use crate::common::{correlated, failing, part};
+use crate::common::{correlated, failing, linear, part};
+use crate::shapes::{DEPTH_M, NEEDLE, Shape, Shapes, case, structure};
 
 fn law_of(covariance_m2: &Matrix6<f64>) -> Result<Law, LawError> {
     Law::new(
@@ -123,4 +127,125 @@ fn bends_have_a_value_at_every_fraction() {
     let certain = of(&[0.0, 1.0], vec![curve(2)], 0.0).unwrap();
     let law = Law::new(Vector6::zeros(), Vec::new(), Some(certain), Vec::new());
     assert_eq!(law, Err(LawError::NoSpread));
+}
+
+/// Distances that are none.
+struct Broken(fn(&Point3<f64>) -> f64);
+
+impl Anatomy for Broken {
+    fn distance_m(&self, _: usize, point_m: &Point3<f64>) -> f64 {
+        (self.0)(point_m)
+    }
+}
+
+fn broken(of: fn(&Point3<f64>) -> f64) -> Result<(), CaseError> {
+    let law = linear(Vector6::zeros(), &correlated([1e-3; 3], [1e-3; 3], 0.0));
+    Case::new(&law, NEEDLE, &[structure(0.0, Vec::new())], &Broken(of)).map(|_| ())
+}
+
+#[test]
+fn distances_must_be_numbers_in_metres_of_something() {
+    assert!(matches!(
+        broken(|_| f64::NAN),
+        Err(CaseError::Distance { .. })
+    ));
+    assert!(matches!(
+        broken(|_| f64::INFINITY),
+        Err(CaseError::Empty { .. })
+    ));
+    // Millimetres.
+    let steep = broken(|point| 1e3 * (0.2 - point.x));
+    assert!(matches!(&steep, Err(CaseError::Steep { structure, .. }) if structure == "vessel"));
+    assert!(steep.unwrap_err().to_string().contains("in m, not mm"));
+    // Beyond the path, where only draws ask.
+    let law = linear(Vector6::zeros(), &correlated([1e-3; 3], [1e-3; 3], 0.0));
+    let structures = [structure(0.0, Vec::new())];
+    let anatomy = Broken(|point| {
+        if point.y > 1e-3 {
+            f64::NAN
+        } else {
+            3e-3 - point.y
+        }
+    });
+    let case = Case::new(&law, NEEDLE, &structures, &anatomy).unwrap();
+    let draws = Draws {
+        seed: 1,
+        most: 1000,
+        threads: 1,
+    };
+    let closer = Event::Closer {
+        structure: 0,
+        margin_m: 0.0,
+    };
+    let found = estimate(&case, &[closer], &draws);
+    assert!(
+        matches!(found, Err(EstimateError::Distance { .. })),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn needles_structures_and_questions_have_sound_lengths() {
+    let law = linear(Vector6::zeros(), &correlated([1e-3; 3], [1e-3; 3], 0.0));
+    let shapes = Shapes(vec![Shape::Around { radius_m: 0.01 }]);
+    let short = Needle {
+        depth_m: 0.0,
+        ..NEEDLE
+    };
+    let structures = [structure(0.0, Vec::new())];
+    assert!(matches!(
+        Case::new(&law, short, &structures, &shapes),
+        Err(CaseError::Needle { .. })
+    ));
+    let negative = [structure(-1e-3, Vec::new())];
+    assert!(matches!(
+        Case::new(&law, NEEDLE, &negative, &shapes),
+        Err(CaseError::Boundary { .. })
+    ));
+    let plane = HalfPlane {
+        normal: Vector2::new(2.0, 0.0),
+        offset_m: 0.01,
+        stretch_m: [0.0, DEPTH_M],
+    };
+    let planes = [structure(0.0, vec![vec![plane]])];
+    assert!(matches!(
+        Case::new(&law, NEEDLE, &planes, &shapes),
+        Err(CaseError::Plane { .. })
+    ));
+    let case = case(&law, &structures, &shapes);
+    let ask = |event: Event, most: u64| {
+        let draws = Draws {
+            seed: 1,
+            most,
+            threads: 1,
+        };
+        estimate(&case, &[event], &draws).unwrap_err()
+    };
+    let within = Event::TipWithin {
+        radius_m: 2e-3,
+        body: Body::Lung,
+    };
+    assert_eq!(ask(within, 10), EstimateError::Draws { draws: 10 });
+    let missing = Event::TipInside { structure: 3 };
+    assert_eq!(
+        ask(missing, 1000),
+        EstimateError::Structure {
+            structure: 3,
+            count: 1
+        }
+    );
+    let margin = Event::Closer {
+        structure: 0,
+        margin_m: -1e-3,
+    };
+    assert!(matches!(
+        ask(margin, 1000),
+        EstimateError::Length { what: "margin", .. }
+    ));
+    let notch = Event::NotchInside {
+        structure: 0,
+        notch_m: [-0.01, 0.01],
+        least_m: 0.005,
+    };
+    assert!(matches!(ask(notch, 1000), EstimateError::Notch { .. }));
 }
