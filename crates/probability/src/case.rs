@@ -292,6 +292,7 @@ impl<'a, A: Anatomy> Case<'a, A> {
     }
 
     /// How far the path of a draw is off at a station relative to a body, m.
+    #[inline]
     pub(crate) fn off_m(
         &self,
         path: &PathDraw,

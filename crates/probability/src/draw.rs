@@ -33,6 +33,7 @@ impl PathDraw {
     }
 
     /// The same without the bend.
+    #[inline]
     pub(crate) fn straight_m(&self, fraction: f64, body: Body) -> Vector3<f64> {
         self.entry_m * (1.0 - fraction) + self.tip_m * fraction - self.breath_m[body.index()]
     }

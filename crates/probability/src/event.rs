@@ -95,7 +95,8 @@ pub(crate) struct Asked<'a, 'c, A> {
     is_screened: bool,
     path: PathDraw,
     shifts: Shifts<'a>,
-    reach_m: [f64; 2],
+    /// How far the path is off relative to each body at most, once it is needed.
+    reach_m: [Option<f64>; 2],
     /// Points of the path relative to each body, and how far they are off, once they are needed.
     points: [Vec<(Point3<f64>, f64)>; 2],
     /// A distance that is not a number.
@@ -109,27 +110,30 @@ impl<'a, 'c, A: Anatomy> Asked<'a, 'c, A> {
         shifts: Shifts<'a>,
         is_screened: bool,
     ) -> Self {
-        let mut asked = Self {
+        Self {
             case,
             is_screened,
             path,
             shifts,
-            reach_m: [0.0; 2],
+            reach_m: [None; 2],
             points: [const { Vec::new() }; 2],
             broken: None,
-        };
-        asked.turn_to(path, shifts);
-        asked
+        }
     }
 
     /// The next draw.
     pub fn turn_to(&mut self, path: PathDraw, shifts: Shifts<'a>) {
         self.path = path;
         self.shifts = shifts;
-        for body in [Body::Wall, Body::Lung] {
-            self.reach_m[body.index()] = self.case.reach_m(&path, body);
-            self.points[body.index()].clear();
+        self.reach_m = [None; 2];
+        for points in &mut self.points {
+            points.clear();
         }
+    }
+
+    fn reach_m(&mut self, body: Body) -> f64 {
+        let (case, path) = (self.case, &self.path);
+        *self.reach_m[body.index()].get_or_insert_with(|| case.reach_m(path, body))
     }
 
     /// Whether an event happens in this draw.
@@ -209,7 +213,7 @@ impl<'a, 'c, A: Anatomy> Asked<'a, 'c, A> {
         } = Structures::of(case, structure);
         let needed_m = case.needle.radius_m + margin_m;
         // What the boundary has to be off by for a hit.
-        let left_m = least_m - needed_m - self.reach_m[body.index()] - SLACK_M;
+        let left_m = least_m - needed_m - self.reach_m(body) - SLACK_M;
         if self.is_screened && sd_m > 0.0 && self.shifts.is_below(structure, left_m / sd_m) {
             return false;
         }
