@@ -13,14 +13,16 @@ use crate::case::{Anatomy, Case};
 use crate::law::Law;
 use crate::planes::HalfPlane;
 
-/// Standard deviations along the needle, and of the boundary, that a stretch is longer by: the best of them.
+/// Standard deviations along the needle, and of the boundary, that a stretch is longer by: the first of them beyond which
+/// hardly anything is, compared with the tails.
 const LONGER: [f64; 5] = [3.0, 4.0, 5.0, 6.0, 8.0];
+const SETTLED: f64 = 0.05;
 
 /// Cells of a bend towards a plane.
 const BENDS: usize = 64;
 
 /// Covers whose bound is computed, of those that come first by their tails without cells.
-const COMPUTED: usize = 3;
+const COMPUTED: usize = 2;
 
 /// None without planes.
 pub(super) fn bound<A: Anatomy>(
@@ -113,8 +115,6 @@ fn of_plane<A: Anatomy>(
     let along = Along::new(case, body);
     let towards = Vector3::new(0.0, plane.normal.x, plane.normal.y);
     let mut best = 1.0_f64;
-    // The same ends come again where a plane is as long as the needle.
-    let mut known: Vec<([f64; 2], f64)> = Vec::new();
     for times in LONGER {
         let beyond_m = needed_m + times * sd_m;
         let boundary = if sd_m > 0.0 {
@@ -123,29 +123,22 @@ fn of_plane<A: Anatomy>(
             0.0
         };
         for shift_m in along.shifts_m(times) {
+            let other = boundary + along.beyond(case, body, shift_m);
+            if other >= best {
+                continue;
+            }
             let ends = [
                 plane.stretch_m[0] - beyond_m - shift_m,
                 plane.stretch_m[1] + beyond_m + shift_m,
             ];
             let ends = ends.map(|x_m| (x_m / case.needle.depth_m).clamp(0.0, case.end()));
-            let found = known.iter().find(|(same, _)| *same == ends);
-            let main = found.map_or_else(
-                || {
-                    tails(
-                        case.law,
-                        body,
-                        &towards,
-                        ends,
-                        plane.offset_m - needed_m,
-                        sd_m,
-                    )
-                },
-                |(_, main)| *main,
-            );
-            if found.is_none() {
-                known.push((ends, main));
+            let distance_m = plane.offset_m - needed_m;
+            let main = tails(case.law, body, &towards, ends, distance_m, sd_m);
+            best = best.min(main + other);
+            if other <= SETTLED * main {
+                // A longer stretch would only make the other part less.
+                return best;
             }
-            best = best.min(main + boundary + along.beyond(case, body, shift_m));
         }
     }
     best

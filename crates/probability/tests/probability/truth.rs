@@ -1,9 +1,10 @@
 //! Estimates against exact probabilities.
 
-use needlebench_probability::{Draws, Estimate, Told, estimate};
+use nalgebra::Vector3;
+use needlebench_probability::{BendDirection, Draws, Estimate, Told, at_most, estimate};
 
 use crate::cells::{Cell, all};
-use crate::shapes::case;
+use crate::shapes::{Shape, case};
 
 fn estimated(cell: &Cell, seed: u64, most: u64) -> Estimate {
     let case = case(&cell.law, &cell.structures, &cell.shapes);
@@ -108,4 +109,47 @@ fn intervals_of_all_cells_cover() {
         worst = worst.min(covered);
     }
     println!("worst {worst} of 200");
+}
+
+/// A line of JSON for each cell, for `tests/validation/probability/compare.py`.
+#[test]
+#[ignore = "prints all cells for a check in SciPy"]
+fn cells_are_printed() {
+    println!();
+    for cell in all() {
+        let case = case(&cell.law, &cell.structures, &cell.shapes);
+        let found = estimated(cell, 7, 1_000_000);
+        let bound = at_most(&case, &cell.event).map_or(1.0, |bound| bound.probability);
+        let law = &cell.law;
+        let failing = law.holds().last().filter(|hold| hold.failed_m.is_some());
+        let vector = |vector: Vector3<f64>| [vector.x, vector.y, vector.z];
+        let breath = failing.map_or([[0.0; 3]; 2], |hold| {
+            [hold.level_sd_m[1], hold.failed_m.unwrap()[1]].map(vector)
+        });
+        let bend = law.bend().map_or("none", |bend| match bend.direction() {
+            BendDirection::Known { .. } => "known",
+            BendDirection::Unknown => "unknown",
+        });
+        let shape = match cell.shapes.0[0] {
+            Shape::HalfSpace { normal, offset_m } => ("half-space", vector(normal), offset_m),
+            Shape::Ball { centre_m, radius_m } => ("ball", vector(centre_m.coords), radius_m),
+            Shape::Around { .. } | Shape::Rod { .. } => unreachable!("no such cells"),
+        };
+        println!(
+            "{{\"mean_m\": {:?}, \"covariance_m2\": {:?}, \"breath_m\": {breath:?}, \"bend\": \"{bend}\", \
+             \"shape\": \"{}\", \"at_m\": {:?}, \"size_m\": {:?}, \"boundary_sd_m\": {:?}, \"wanted\": {}, \
+             \"probability\": {:?}, \"low\": {:?}, \"high\": {:?}, \"at_most\": {bound:?}, \"exact\": {:?}}}",
+            law.mean_m().as_slice(),
+            law.covariance_m2().as_slice(),
+            shape.0,
+            shape.1,
+            shape.2,
+            cell.structures[0].boundary_sd_m,
+            cell.event.is_wanted(),
+            found.probability.unwrap(),
+            found.interval.low,
+            found.interval.high,
+            cell.exact,
+        );
+    }
 }
