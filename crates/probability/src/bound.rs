@@ -9,7 +9,7 @@ mod planes;
 mod stations;
 
 use crate::case::{Anatomy, Case};
-use crate::event::Event;
+use crate::event::{Event, EventError};
 
 /// How a bound was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,20 +38,29 @@ const CLEAR: f64 = 0.01;
 const ROUNDING: f64 = 1e-9;
 
 /// How likely a needle comes closer to structures than a margin, at most; none for events that are wanted.
-pub fn at_most<A: Anatomy>(case: &Case<'_, A>, event: &Event) -> Option<Bound> {
-    let (structures, margin_m) = event.obstacles()?;
+///
+/// # Errors
+/// [`EventError`].
+pub fn at_most<A: Anatomy>(case: &Case<'_, A>, event: &Event) -> Result<Option<Bound>, EventError> {
+    event.check(case)?;
+    Ok(event
+        .obstacles()
+        .map(|(structures, margin_m)| of_structures(case, structures, margin_m)))
+}
+
+fn of_structures<A: Anatomy>(case: &Case<'_, A>, structures: &[usize], margin_m: f64) -> Bound {
     let each: Vec<Bound> = structures
         .iter()
         .map(|structure| of_structure(case, *structure, margin_m))
         .collect();
     if let [one] = each.as_slice() {
-        return Some(*one);
+        return *one;
     }
     let sum: f64 = each.iter().map(|bound| bound.probability).sum();
-    Some(Bound {
+    Bound {
         probability: sum.min(1.0),
         kind: BoundKind::Sum,
-    })
+    }
 }
 
 fn of_structure<A: Anatomy>(case: &Case<'_, A>, structure: usize, margin_m: f64) -> Bound {

@@ -2,7 +2,7 @@
 
 use crate::case::{Anatomy, Case};
 use crate::draw::{Shifts, Streams, path};
-use crate::event::{Asked, Event};
+use crate::event::{Asked, Event, EventError};
 use crate::importance::{Drawn, Proposal, Search};
 use crate::influence::{Influence, Origin, Reweighting};
 use crate::interval::{
@@ -95,32 +95,9 @@ pub struct Estimate {
 /// Why there is no estimate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EstimateError {
-    /// A structure that is not there.
-    #[error("structure {structure} is not one of the {count} of the case")]
-    Structure {
-        /// Number.
-        structure: usize,
-        /// How many there are.
-        count: usize,
-    },
-    /// A margin, a radius or a length.
-    #[error("{what} is {value_m} m; must be 0 or more")]
-    Length {
-        /// What it is.
-        what: &'static str,
-        /// As given, m.
-        value_m: f64,
-    },
-    /// A notch that is not on the needle.
-    #[error(
-        "the notch from {from_m} to {to_m} m from the tip is not between entry and the end of the throw"
-    )]
-    Notch {
-        /// Its beginning, m.
-        from_m: f64,
-        /// Its end, m.
-        to_m: f64,
-    },
+    /// An event.
+    #[error(transparent)]
+    Event(#[from] EventError),
     /// Too few draws.
     #[error("{draws} draws are too few; at least 100")]
     Draws {
@@ -288,7 +265,7 @@ impl<'s, 'c, A: Anatomy> Sampler<'s, 'c, A> {
             return Err(EstimateError::Draws { draws: draws.most });
         }
         for event in events {
-            check(case, event)?;
+            event.check(case)?;
         }
         let streams = Streams::new(draws.seed);
         let reweighting = Reweighting::new(case.law);
@@ -600,61 +577,5 @@ impl<'s, 'c, A: Anatomy> Sampler<'s, 'c, A> {
             method,
             influences,
         }
-    }
-}
-
-fn check<A>(case: &Case<'_, A>, event: &Event) -> Result<(), EstimateError> {
-    let exists = |structure: usize| {
-        let count = case.structures.len();
-        if structure < count {
-            Ok(())
-        } else {
-            Err(EstimateError::Structure { structure, count })
-        }
-    };
-    let length = |what: &'static str, value_m: f64| {
-        if value_m >= 0.0 && value_m.is_finite() {
-            Ok(())
-        } else {
-            Err(EstimateError::Length { what, value_m })
-        }
-    };
-    match event {
-        Event::Closer {
-            structure,
-            margin_m,
-        } => {
-            exists(*structure)?;
-            length("margin", *margin_m)
-        }
-        Event::Any {
-            structures,
-            margin_m,
-        } => {
-            for structure in structures {
-                exists(*structure)?;
-            }
-            length("margin", *margin_m)
-        }
-        Event::TipInside { structure } => exists(*structure),
-        Event::NotchInside {
-            structure,
-            notch_m: [from_m, to_m],
-            least_m,
-        } => {
-            exists(*structure)?;
-            length("length of the notch inside", *least_m)?;
-            let needle = &case.needle;
-            let is_on_needle = *from_m >= -needle.depth_m && *to_m <= needle.throw_m;
-            if is_on_needle && from_m < to_m {
-                Ok(())
-            } else {
-                Err(EstimateError::Notch {
-                    from_m: *from_m,
-                    to_m: *to_m,
-                })
-            }
-        }
-        Event::TipWithin { radius_m, .. } => length("radius", *radius_m),
     }
 }

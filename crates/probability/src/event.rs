@@ -48,6 +48,63 @@ pub enum Event {
 }
 
 impl Event {
+    /// Whether a case can be asked for it.
+    pub(crate) fn check<A>(&self, case: &Case<'_, A>) -> Result<(), EventError> {
+        let exists = |structure: usize| {
+            let count = case.structures.len();
+            if structure < count {
+                Ok(())
+            } else {
+                Err(EventError::Structure { structure, count })
+            }
+        };
+        let length = |what: &'static str, value_m: f64| {
+            if value_m >= 0.0 && value_m.is_finite() {
+                Ok(())
+            } else {
+                Err(EventError::Length { what, value_m })
+            }
+        };
+        match self {
+            Self::Closer {
+                structure,
+                margin_m,
+            } => {
+                exists(*structure)?;
+                length("margin", *margin_m)
+            }
+            Self::Any {
+                structures,
+                margin_m,
+            } => {
+                for structure in structures {
+                    exists(*structure)?;
+                }
+                length("margin", *margin_m)
+            }
+            Self::TipInside { structure } => exists(*structure),
+            Self::NotchInside {
+                structure,
+                notch_m: [from_m, to_m],
+                least_m,
+            } => {
+                exists(*structure)?;
+                length("length of the notch inside", *least_m)?;
+                let needle = &case.needle;
+                let is_on_needle = *from_m >= -needle.depth_m && *to_m <= needle.throw_m;
+                if is_on_needle && from_m < to_m {
+                    Ok(())
+                } else {
+                    Err(EventError::Notch {
+                        from_m: *from_m,
+                        to_m: *to_m,
+                    })
+                }
+            }
+            Self::TipWithin { radius_m, .. } => length("radius", *radius_m),
+        }
+    }
+
     /// Whether it is wanted: its misses are then what is rare.
     pub fn is_wanted(&self) -> bool {
         !matches!(self, Self::Closer { .. } | Self::Any { .. })
@@ -77,6 +134,37 @@ impl Event {
             Self::Any { .. } | Self::TipWithin { .. } => None,
         }
     }
+}
+
+/// Why a case cannot be asked for an event.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EventError {
+    /// A structure that is not there.
+    #[error("structure {structure} is not one of the {count} of the case")]
+    Structure {
+        /// Number.
+        structure: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A margin, a radius or a length.
+    #[error("{what} is {value_m} m; must be 0 or more")]
+    Length {
+        /// What it is.
+        what: &'static str,
+        /// As given, m.
+        value_m: f64,
+    },
+    /// A notch that is not on the needle.
+    #[error(
+        "the notch from {from_m} to {to_m} m from the tip is not between entry and the end of the throw"
+    )]
+    Notch {
+        /// Its beginning, m.
+        from_m: f64,
+        /// Its end, m.
+        to_m: f64,
+    },
 }
 
 /// Beyond this the screen leaves a draw out, m: more than rounding, and than [`TOUCHING_M`].

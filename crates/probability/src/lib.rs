@@ -50,7 +50,7 @@ pub use error::LawError;
 pub use estimate::{
     Draws, Estimate, EstimateError, MOST_DRAWS, Method, Told, difference, estimate,
 };
-pub use event::Event;
+pub use event::{Event, EventError};
 pub use influence::{Influence, Origin};
 pub use interval::{CONFIDENCE, Difference, Interval, share_interval, weighted_interval};
 pub use law::{Law, Part};

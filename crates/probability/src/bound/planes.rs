@@ -13,8 +13,8 @@ use crate::case::{Anatomy, Case};
 use crate::law::Law;
 use crate::planes::HalfPlane;
 
-/// Standard deviations along the needle, and of the boundary, that a stretch is longer by: the first of them beyond which
-/// hardly anything is, compared with the tails.
+/// Standard deviations along the needle, and of the boundary, that a stretch is longer by: the first of them beyond
+/// which hardly anything is, compared with the tails.
 const LONGER: [f64; 5] = [3.0, 4.0, 5.0, 6.0, 8.0];
 const SETTLED: f64 = 0.05;
 

@@ -111,7 +111,13 @@ impl Axis {
         let mut stretches_m = Vec::new();
         let mut from = first;
         while from < last {
-            stretches_m.push(case.stretch_m(structure, [from, from + step]));
+            let clear_m = case.stretch_m(structure, [from, from + step]);
+            // What is not a number may be anywhere.
+            stretches_m.push(if clear_m.is_nan() {
+                f64::NEG_INFINITY
+            } else {
+                clear_m
+            });
             from = first + step * stretches_m.len() as f64;
         }
         Self {

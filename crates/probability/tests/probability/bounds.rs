@@ -19,7 +19,8 @@ fn bounds_are_never_below_the_quadrature() {
         let with_planes = at_most(
             &case(&cell.law, &cell.structures, &cell.shapes),
             &cell.event,
-        );
+        )
+        .unwrap();
         let Some(with_planes) = with_planes else {
             assert!(cell.event.is_wanted());
             continue;
@@ -29,7 +30,9 @@ fn bounds_are_never_below_the_quadrature() {
             .iter()
             .map(|each| structure(each.boundary_sd_m, Vec::new()))
             .collect();
-        let stations = at_most(&case(&cell.law, &without, &cell.shapes), &cell.event).unwrap();
+        let stations = at_most(&case(&cell.law, &without, &cell.shapes), &cell.event)
+            .unwrap()
+            .unwrap();
         assert_eq!(stations.kind, BoundKind::Stations);
         assert_eq!(with_planes.kind, BoundKind::HalfPlanes);
         for bound in [with_planes, stations] {
@@ -66,7 +69,9 @@ fn bounds_of_what_surrounds_the_needle_are_never_below_the_quadrature() {
             radius_m: NEEDED_M + spare_m,
         }]);
         let structures = [structure(0.0, Vec::new())];
-        let bound = at_most(&case(&law, &structures, &shapes), &closer()).unwrap();
+        let bound = at_most(&case(&law, &structures, &shapes), &closer())
+            .unwrap()
+            .unwrap();
         let exact = 1.0 - in_disc([mean_m[1], mean_m[2]], [sd_m[1], sd_m[2]], spare_m);
         println!("{number}: {exact:.2e} {:.2e}", bound.probability);
         assert_eq!(bound.kind, BoundKind::Stations);

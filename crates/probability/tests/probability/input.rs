@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix6, Point3, Vector2, Vector3, Vector6};
 use needlebench_probability::{
-    Anatomy, Bend, BendDirection, Body, Case, CaseError, Draws, EstimateError, Event, HalfPlane,
-    Hold, Law, LawError, Needle, estimate,
+    Anatomy, Bend, BendDirection, Body, Case, CaseError, Draws, EstimateError, Event, EventError,
+    HalfPlane, Hold, Law, LawError, Needle, at_most, estimate,
 };
 
 use crate::common::{correlated, failing, linear, part};
@@ -226,10 +226,18 @@ fn needles_structures_and_questions_have_sound_lengths() {
         body: Body::Lung,
     };
     assert_eq!(ask(within, 10), EstimateError::Draws { draws: 10 });
+    let rejected = |event: Event| {
+        // Bounds reject what estimates do.
+        let EstimateError::Event(found) = ask(event.clone(), 1000) else {
+            panic!("another error");
+        };
+        assert_eq!(at_most(&case, &event), Err(found.clone()));
+        found
+    };
     let missing = Event::TipInside { structure: 3 };
     assert_eq!(
-        ask(missing, 1000),
-        EstimateError::Structure {
+        rejected(missing),
+        EventError::Structure {
             structure: 3,
             count: 1
         }
@@ -239,13 +247,13 @@ fn needles_structures_and_questions_have_sound_lengths() {
         margin_m: -1e-3,
     };
     assert!(matches!(
-        ask(margin, 1000),
-        EstimateError::Length { what: "margin", .. }
+        rejected(margin),
+        EventError::Length { what: "margin", .. }
     ));
     let notch = Event::NotchInside {
         structure: 0,
         notch_m: [-0.01, 0.01],
         least_m: 0.005,
     };
-    assert!(matches!(ask(notch, 1000), EstimateError::Notch { .. }));
+    assert!(matches!(rejected(notch), EventError::Notch { .. }));
 }

@@ -63,7 +63,7 @@ fn bounds_are_not_below_estimates_in_random_scenes() {
             structure: 0,
             margin_m: 0.3e-3,
         };
-        let bound = at_most(&case, &event).unwrap();
+        let bound = at_most(&case, &event).unwrap().unwrap();
         let draws = Draws {
             seed: u64::from(scene),
             most: 100_000,

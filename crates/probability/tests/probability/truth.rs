@@ -119,7 +119,9 @@ fn cells_are_printed() {
     for cell in all() {
         let case = case(&cell.law, &cell.structures, &cell.shapes);
         let found = estimated(cell, 7, 1_000_000);
-        let bound = at_most(&case, &cell.event).map_or(1.0, |bound| bound.probability);
+        let bound = at_most(&case, &cell.event)
+            .unwrap()
+            .map_or(1.0, |bound| bound.probability);
         let law = &cell.law;
         let failing = law.holds().last().filter(|hold| hold.failed_m.is_some());
         let vector = |vector: Vector3<f64>| [vector.x, vector.y, vector.z];
