@@ -16,6 +16,7 @@ const LAYERS: [(&str, &[&str]); 38] = [
     ("parallel", &[]),
     ("numerics", &[]),
     ("insertion", &["numerics"]),
+    ("probability", &["numerics", "parallel"]),
     ("kinematics", &["numerics"]),
     ("geometry", &["kinematics"]),
     ("input", &[]),

@@ -90,9 +90,45 @@ pub fn quantile(a: f64, b: f64, probability: f64) -> f64 {
     }
 }
 
+/// Clopper and Pearson's interval of a share that was seen in `size` independent trials, which need not be a whole
+/// number: Biometrika 26 (1934) 404. The true share is beyond each end with a probability of at most `tail`; of no trials
+/// it is anywhere between 0 and 1.
+pub fn clopper_pearson(share: f64, size: f64, tail: f64) -> [f64; 2] {
+    let share = share.clamp(0.0, 1.0);
+    if size <= 0.0 || size.is_nan() {
+        return [0.0, 1.0];
+    }
+    let (successes, failures) = (share * size, (1.0 - share) * size);
+    let low = if share <= 0.0 {
+        0.0
+    } else {
+        quantile(successes, failures + 1.0, tail)
+    };
+    let high = if share >= 1.0 {
+        1.0
+    } else {
+        1.0 - quantile(failures, successes + 1.0, tail)
+    };
+    [low, high]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_in_n_trials_leaves_3_7_in_n() {
+        for n in [100.0, 1e4, 1e6] {
+            let [low, high] = clopper_pearson(0.0, n, 0.025);
+            let exact = -libm::expm1(libm::log(0.025) / n);
+            assert!(
+                low == 0.0 && (high / exact - 1.0).abs() < 1e-7,
+                "{n}: {high}"
+            );
+            assert!((3.6..3.7).contains(&(high * n)), "{n}: {high}");
+        }
+        assert_eq!(clopper_pearson(0.5, 0.0, 0.025), [0.0, 1.0]);
+    }
 
     #[test]
     fn gamma_is_the_factorial() {

@@ -93,26 +93,8 @@ pub fn clopper_pearson(share: f64, size: f64) -> Interval {
 
 /// The same with another probability that the true value is beyond each end.
 pub(crate) fn clopper_pearson_with(share: f64, size: f64, tail: f64) -> Interval {
-    let share = share.clamp(0.0, 1.0);
-    if size <= 0.0 || size.is_nan() {
-        return Interval {
-            low: 0.0,
-            high: 1.0,
-        };
-    }
-    let (successes, failures) = (share * size, (1.0 - share) * size);
-    Interval {
-        low: if share <= 0.0 {
-            0.0
-        } else {
-            beta::quantile(successes, failures + 1.0, tail)
-        },
-        high: if share >= 1.0 {
-            1.0
-        } else {
-            1.0 - beta::quantile(failures, successes + 1.0, tail)
-        },
-    }
+    let [low, high] = beta::clopper_pearson(share, size, tail);
+    Interval { low, high }
 }
 
 /// Interval of a mean from its standard error.
