@@ -23,6 +23,7 @@ from model import (
     Arm,
     defaults,
     from_rpy,
+    from_vector,
     read_chain,
     read_deviations,
     read_toml,
@@ -102,6 +103,17 @@ def last_phase(path: Path, phase: dict) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
+def tilted(straight: np.ndarray, along: np.ndarray, head: np.ndarray) -> np.ndarray:
+    """Axes of a guide that stands along one line, tilted to another."""
+    straight = straight / np.linalg.norm(straight)
+    towards_head = head - straight * (head @ straight)
+    towards_head /= np.linalg.norm(towards_head)
+    about = np.cross(straight, along)
+    sine = np.linalg.norm(about)
+    turn = from_vector(about / sine * np.arctan2(sine, straight @ along)) if sine > 0.0 else np.eye(3)
+    return np.array([turn @ towards_head, turn @ np.cross(straight, towards_head), along])
+
+
 def pushed_towards(block: dict, axes: np.ndarray, turn: np.ndarray) -> np.ndarray | None:
     """Away from where the bevel's face looks, along the goal's axes: a unit vector, if that is known."""
     bevel = block.get("bevel", "unknown")
@@ -176,6 +188,12 @@ def cases(
         towards_head /= np.linalg.norm(towards_head)
         axes = np.array([towards_head, np.cross(along, towards_head), along])
         block = defaults("NeedleBlock", scenario["imperfections"].get("needle", {}))
+        pushed = pushed_towards(block, axes, turn)
+        if block["aim"]:
+            # The guide is tilted from where it would stand, and so are the axes.
+            clock = axes[:2]
+            axes = tilted(target - np.array(goal["entry_m"]), along, turn[:, 2])
+            pushed = axes[:2] @ (pushed @ clock)
         bends = block["model"] == "tissue" and "needle" in scenario["imperfections"]
         blocks = scenario["imperfections"]
         if block.get("turn_at") == "best":
@@ -205,7 +223,7 @@ def cases(
                 scenario.get("engines", {}).get("timestep_ms", 1.0) * 1e-3,
                 blocks,
                 layers_of(goal, radius, offset + aim) if bends else [],
-                pushed_towards(block, axes, turn),
+                pushed,
                 axes @ aim,
             )
             assert block["aim"] or np.abs(aim).max() < SAME_POINT_M, goal["name"]

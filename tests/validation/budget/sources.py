@@ -432,6 +432,8 @@ def needle_in_tissue(
 
     What the play of the guide does is part of it, as the force presses the needle to the walls.
     """
+    # With the depth of the turn that was chosen for the goal.
+    block = defaults("NeedleBlock", case.blocks["needle"])
     tool = case.arm.tool
     play = 0.5 * clearance_of(case, case.blocks["guide"]) if "guide" in case.blocks else 0.0
     held = (tool.guide_length, case.depths[0], play)
