@@ -118,7 +118,13 @@ interface RouteAnswer {
   entry_moved_m: number;
   length_m: number;
   /** How tissue bends the median needle: depths and how far it is off the straight line, m. */
-  bend: { path_m: [number, number][]; towards: Point | null; is_force_measured: boolean } | null;
+  bend: {
+    path_m: [number, number][];
+    tip_m: number;
+    is_aimed: boolean;
+    towards: Point | null;
+    is_force_measured: boolean;
+  } | null;
   insertion_m: number | null;
   not_placed: Refusal | null;
   needle_m: number;
