@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6};
 use needlebench_kinematics::Pose;
 use needlebench_kinematics::registration::{
-    Localised, RegistrationError, displacement_covariance, register, register_weighted,
+    Localised, RegistrationError, register, register_weighted,
     transform_covariance,
 };
 use needlebench_scenario::imperfections::{Localisation, Markers};
@@ -153,9 +153,14 @@ impl FitError {
         })
     }
 
-    /// Covariance of the error at a point (target registration error), m^2.
-    pub(crate) fn covariance_at(&self, point: &Point3<f64>) -> Matrix3<f64> {
-        displacement_covariance(&self.covariance, &(point - self.about_m))
+    /// Of how the fit slides, m, and turns, rad.
+    pub(crate) fn covariance(&self) -> &Matrix6<f64> {
+        &self.covariance
+    }
+
+    /// How it moves a point (target registration error).
+    pub(crate) fn moves_at(&self, point: &Point3<f64>) -> Matrix3x6<f64> {
+        displacement(&(point - self.about_m))
     }
 
     /// Mean of where a point is planned, less where it is by the inverse of the fit; of second order, m.

@@ -1,6 +1,9 @@
 //! The budget by Jacobians.
 
-use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, SymmetricEigen, Vector3};
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, SymmetricEigen, Vector3, Vector6};
+use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints, Pose};
 use needlebench_scenario::imperfections::{
     AbsorbedSag, ArmPopulation, Imperfections, NeedleBending, OriginDeviations,
@@ -44,6 +47,7 @@ pub(super) fn errors(
     let joints = JointErrors::new(case, imperfections, &truth, &target);
     let from_world = case.axes_from_world();
     let points = case.planned();
+    let joint_m2 = covariance(case, imperfections, &joints, &points)?;
     let bends = bends.filter(|_| imperfections.tissue().is_some());
     // A bevel looks to a side of the patient, however the guide is turned about the needle.
     let roll_0 = case.goal.world_from_guide_exit.rotation;
@@ -55,7 +59,6 @@ pub(super) fn errors(
             discs: Vec::new(),
             bend: bends.map(|bends| bends.at(index, |across| roll_0 * across)),
         };
-        let jacobian = tip_jacobian(case, &target, point);
         let displaced = |errors: &Joints| mean_displacement(case, &truth, &target, errors, point);
         let mut bias = displaced(&joints.bias);
         for deviation in joints.principal_deviations() {
@@ -63,23 +66,14 @@ pub(super) fn errors(
                 [1.0, -1.0].map(|sign| displaced(&(joints.bias + deviation * sign)));
             bias += 0.5 * (ahead + behind) - displaced(&joints.bias);
         }
-        let mut covariance = jacobian * joints.rigid_covariance * jacobian.transpose();
-        covariance += elasticity(case, imperfections, &joints, &jacobian, &target, point);
         if let Some(arms) = &imperfections.calibration {
-            let (curved, spread) = calibration(case, arms, &target, point);
-            bias += curved;
-            covariance += spread;
+            bias += curved_by_calibration(case, arms, &target, point);
         }
         let place = case.place.copied().unwrap_or_else(Pose::identity);
         let turn = place.rotation.to_rotation_matrix();
         let skin = imperfections.skin_markers.as_ref();
-        let seen = imperfections.registration.as_ref();
-        let seen = seen.map(FitError::of_localisation);
-        let moving = skin.map(|skin| FitError::of_shifts(&skin.markers, skin.shift_m));
-        for fit in seen.into_iter().chain(moving) {
-            let (fit, in_phantom) = (fit?, place.inverse() * point);
-            covariance += turn * fit.covariance_at(&in_phantom) * turn.inverse();
-            bias += turn * fit.mean_at(&in_phantom);
+        for fit in fits(imperfections) {
+            bias += turn * fit?.mean_at(&(place.inverse() * point));
         }
         if let Some(skin) = skin {
             // The phantom is believed to be where its markers have risen to.
@@ -87,29 +81,11 @@ pub(super) fn errors(
             errors.breaths.push((risen, skin.breathing));
         }
         if let Some(error) = &imperfections.hand_eye {
-            let arm = point.coords - place.translation.vector;
-            let (slid, turned) = (error.translation_m.powi(2), error.rotation_rad.powi(2));
-            // E[(w x r)(w x r)^T] = s^2 (r.r I - r r^T) for independent w of variance s^2.
-            let swung = Matrix3::identity() * arm.norm_squared() - arm * arm.transpose();
-            covariance += Matrix3::identity() * slid + swung * turned;
             // E[w x (w x r)] / 2 = -s^2 r; the target moves, so the error is the other way.
-            bias += arm * turned;
-        }
-        if let (Some(seen), 1) = (&imperfections.imaging, index) {
-            let in_phantom = seen.root_m * seen.root_m.transpose();
-            covariance += turn * in_phantom * turn.inverse();
-        }
-        // As the goal has the needle, which is where the posture has it.
-        let inwards = case.goal.axis.into_inner();
-        let beside = Matrix3::identity() - inwards * inwards.transpose();
-        if let Some(NeedleBending::Cantilever(needle)) = &imperfections.needle {
-            let [depth_m, length_m] = [case.depths_m()[index], case.depths_m()[1]];
-            let bent_m = needle.side_force_n * needle.compliance_m_per_n(depth_m, length_m);
-            covariance += beside * (0.5 * bent_m * bent_m);
+            bias += (point.coords - place.translation.vector) * error.rotation_rad.powi(2);
         }
         if let Some(indentation) = &imperfections.indentation {
-            bias -= inwards * indentation.mean_m[index];
-            covariance += inwards * inwards.transpose() * indentation.spread_m[index].powi(2);
+            bias -= case.goal.axis.into_inner() * indentation.mean_m[index];
         }
         if let Some(breathing) = &imperfections.breathing {
             let amplitude = [breathing.skin_m, breathing.target_m][index];
@@ -126,12 +102,121 @@ pub(super) fn errors(
                 .into();
         }
         errors.mean_m = bias;
-        errors.covariance_m2 = covariance;
+        errors.covariance_m2 = block(&joint_m2, index);
         let errors = errors.turned(&from_world);
         Ok((errors.moments(), errors))
     };
     let [skin, target] = &points;
     Ok([of_point(0, skin)?, of_point(1, target)?])
+}
+
+/// Covariance of one point of two.
+fn block(joint_m2: &Matrix6<f64>, index: usize) -> Matrix3<f64> {
+    joint_m2
+        .fixed_view::<3, 3>(3 * index, 3 * index)
+        .into_owned()
+}
+
+/// Both of two matrices, one below the other.
+fn stacked(both: &[Matrix3x6<f64>; 2]) -> Matrix6<f64> {
+    let mut matrix = Matrix6::zeros();
+    for (index, each) in both.iter().enumerate() {
+        matrix.fixed_view_mut::<3, 6>(3 * index, 0).copy_from(each);
+    }
+    matrix
+}
+
+/// Sum of the squares of pairs of vectors that go together.
+fn squares(columns: impl Iterator<Item = [Vector3<f64>; 2]>) -> Matrix6<f64> {
+    let mut sum = Matrix6::zeros();
+    for [skin, target] in columns {
+        let column = Vector6::new(skin.x, skin.y, skin.z, target.x, target.y, target.z);
+        sum += column * column.transpose();
+    }
+    sum
+}
+
+/// Covariance of first order of skin and target together, world, m^2: of all sources that are linear. Breaths, play and
+/// tissue are not.
+fn covariance(
+    case: &BudgetCase<'_>,
+    imperfections: &Imperfections,
+    joints: &JointErrors,
+    points: &[Point3<f64>; 2],
+) -> Result<Matrix6<f64>, BudgetError> {
+    let q = case.target();
+    let jacobians = points.each_ref().map(|point| tip_jacobian(case, &q, point));
+    let jacobian = stacked(&jacobians);
+    let mut sum = jacobian * joints.rigid_covariance * jacobian.transpose();
+    sum += elasticity(case, imperfections, joints, &jacobians, points);
+    if let Some(arms) = &imperfections.calibration {
+        let origins = world_from_origins(case, &q);
+        let modes = arms.modes.iter();
+        sum += squares(modes.map(|mode| {
+            points
+                .each_ref()
+                .map(|point| moved_with(&origins, mode, point))
+        }));
+    }
+    let place = case.place.copied().unwrap_or_else(Pose::identity);
+    let turn = place.rotation.to_rotation_matrix();
+    for fit in fits(imperfections) {
+        let fit = fit?;
+        let moves = points
+            .each_ref()
+            .map(|point| turn * fit.moves_at(&(place.inverse() * point)));
+        let moves = stacked(&moves);
+        sum += moves * fit.covariance() * moves.transpose();
+    }
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    if let Some(error) = &imperfections.hand_eye {
+        let arms = points
+            .each_ref()
+            .map(|point| point.coords - place.translation.vector);
+        sum += squares(axes.iter().map(|axis| [axis * error.translation_m; 2]));
+        sum += squares(
+            axes.iter()
+                .map(|axis| arms.map(|arm| axis.cross(&arm) * error.rotation_rad)),
+        );
+    }
+    if let Some(seen) = &imperfections.imaging {
+        let root_m = turn * seen.root_m;
+        sum += squares((0..3).map(|k| [Vector3::zeros(), root_m.column(k).into_owned()]));
+    }
+    // As the goal has the needle, which is where the posture has it.
+    if let Some(NeedleBending::Cantilever(needle)) = &imperfections.needle {
+        let lateral = [Vector3::x(), Vector3::y()]
+            .map(|axis| case.goal.world_from_guide_exit.rotation * axis);
+        let depths_m = case.depths_m();
+        let bent_m = depths_m.map(|depth_m| {
+            needle.side_force_n * needle.compliance_m_per_n(depth_m, depths_m[1]) * FRAC_1_SQRT_2
+        });
+        sum += squares(
+            lateral
+                .iter()
+                .map(|axis| bent_m.map(|bent_m| axis * bent_m)),
+        );
+    }
+    if let Some(indentation) = &imperfections.indentation {
+        let inwards = case.goal.axis.into_inner();
+        let [skin_m, target_m] = indentation.spread_m;
+        let columns = [
+            [inwards * skin_m, Vector3::zeros()],
+            [Vector3::zeros(), inwards * target_m],
+        ];
+        sum += squares(columns.into_iter());
+    }
+    Ok(sum)
+}
+
+/// Errors of the fits to markers that are seen, and to those that move with the skin.
+fn fits(
+    imperfections: &Imperfections,
+) -> impl Iterator<Item = Result<FitError, RegistrationError>> + '_ {
+    let seen = imperfections.registration.iter();
+    let skin = imperfections.skin_markers.iter();
+    let moving = skin.map(|skin| FitError::of_shifts(&skin.markers, skin.shift_m));
+    seen.map(FitError::of_localisation).chain(moving)
 }
 
 /// Linear Jacobian of a point of the last link, world, m/rad.
@@ -282,60 +367,65 @@ fn world_from_origins(case: &BudgetCase<'_>, q: &Joints) -> [Pose; JOINT_COUNT] 
     })
 }
 
-/// Covariance of a point under gears of uncertain compliance, world: of each joint what its twist does,
+/// How a deviation of all joints' origins moves a point.
+fn moved_with(
+    origins: &[Pose; JOINT_COUNT],
+    deviations: &OriginDeviations,
+    point: &Point3<f64>,
+) -> Vector3<f64> {
+    let moved = (0..JOINT_COUNT).map(|i| moved_by(&origins[i], &deviations[i], point));
+    moved.sum()
+}
+
+/// Covariance of two points under gears of uncertain compliance, world: of each joint what its twist does,
 /// less what a calibration has taken of it for geometry; and of which calibration that was.
 fn elasticity(
     case: &BudgetCase<'_>,
     imperfections: &Imperfections,
     joints: &JointErrors,
-    jacobian: &Matrix3x6<f64>,
-    q: &Joints,
-    point: &Point3<f64>,
-) -> Matrix3<f64> {
+    jacobians: &[Matrix3x6<f64>; 2],
+    points: &[Point3<f64>; 2],
+) -> Matrix6<f64> {
     let Some(elasticity) = &imperfections.elasticity else {
-        return Matrix3::zeros();
+        return Matrix6::zeros();
     };
-    let origins = world_from_origins(case, q);
-    let moved = |taken: &OriginDeviations| -> Vector3<f64> {
-        let moved = (0..JOINT_COUNT).map(|i| moved_by(&origins[i], &taken[i], point));
-        moved.sum()
+    let origins = world_from_origins(case, &case.target());
+    let moved = |taken: &OriginDeviations| {
+        points
+            .each_ref()
+            .map(|point| moved_with(&origins, taken, point))
     };
     let absorbed = elasticity.absorbed.as_deref();
     let columns = (0..JOINT_COUNT).map(|joint| {
-        let sags = jacobian * (joints.followed.column(joint) * joints.sag_spread[joint]);
-        let taken = absorbed.map_or_else(Vector3::zeros, |absorbed| moved(&absorbed.mean()[joint]));
-        sags + taken * elasticity.spread
+        let twist = joints.followed.column(joint) * joints.sag_spread[joint];
+        let taken = absorbed.map_or_else(
+            || [Vector3::zeros(); 2],
+            |absorbed| moved(&absorbed.mean()[joint]),
+        );
+        std::array::from_fn(|at| jacobians[at] * twist + taken[at] * elasticity.spread)
     });
     let modes = absorbed.map_or(&[][..], AbsorbedSag::modes);
-    let columns = columns.chain(modes.iter().map(moved));
-    columns.map(|column| column * column.transpose()).sum()
+    squares(columns.chain(modes.iter().map(moved)))
 }
 
-/// Second-order part of the mean, and covariance, of a point under a population of arms, world.
-fn calibration(
+/// Second-order part of the mean of a point under a population of arms, world.
+fn curved_by_calibration(
     case: &BudgetCase<'_>,
     arms: &ArmPopulation,
     q: &Joints,
     point: &Point3<f64>,
-) -> (Vector3<f64>, Matrix3<f64>) {
+) -> Vector3<f64> {
     let robot = &case.cell.robot;
-    let origins = world_from_origins(case, q);
     let in_flange = robot.world_from_flange(q).inverse() * point;
     let at = |deviations: &[nalgebra::Vector6<f64>; JOINT_COUNT]| -> Point3<f64> {
         let chain = ArmPopulation::moved(&robot.chain, deviations);
         robot.world_from_base_link * chain.base_link_from_flange(q) * in_flange
     };
     let centre = at(&arms.mean);
-    let mut curved = Vector3::zeros();
-    let mut covariance = Matrix3::zeros();
-    for mode in &arms.modes {
-        let moved: Vector3<f64> = (0..JOINT_COUNT)
-            .map(|i| moved_by(&origins[i], &mode[i], point))
-            .sum();
-        covariance += moved * moved.transpose();
+    let curved = arms.modes.iter().map(|mode| {
         let [ahead, behind] = [1.0, -1.0]
             .map(|sign| at(&std::array::from_fn(|i| arms.mean[i] + mode[i] * sign)) - centre);
-        curved += 0.5 * (ahead + behind);
-    }
-    (curved, covariance)
+        0.5 * (ahead + behind)
+    });
+    curved.sum()
 }
