@@ -61,6 +61,7 @@ const LAYERS: [(&str, &[&str]); 39] = [
         "uncertainty",
         &[
             "engine",
+            "probability",
             "scenario",
             "cell",
             "insertion",

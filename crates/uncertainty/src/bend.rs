@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use needlebench_insertion::{Factor, MODEL};
 use needlebench_numerics::random::SplitMix64;
 use needlebench_scenario::Goal;
-use needlebench_scenario::imperfections::{NeedleDraw, TissueError, TissueNeedle};
+use needlebench_scenario::imperfections::{NeedleDraw, TissueError, TissueNeedle, bend_at_m};
 
 use crate::distribution::{Variable, hypercube};
 
@@ -96,11 +96,57 @@ const DRAWS: usize = 512;
 /// How far needles are off a goal's axis where they pierce the skin and at their tips, m, towards where their bevel pushes
 /// them: the same draws of patients and needles for every needle and goal.
 pub fn drawn_bends_m(needle: &TissueNeedle, goal: &Goal) -> Vec<[f64; 2]> {
+    let sizes_m = |row: Vec<f64>| DrawnNeedle::new(needle, &row).sizes_m(goal);
+    rows().into_iter().map(sizes_m).collect()
+}
+
+/// Values of the variables of each draw.
+fn rows() -> Vec<Vec<f64>> {
     let mut variables = vec![Variable::Normal; DrawnNeedle::NORMALS];
     variables.push(Variable::Uniform);
-    let rows = hypercube(&variables, DRAWS, &mut SplitMix64::new(0));
-    let sizes_m = |row: Vec<f64>| DrawnNeedle::new(needle, &row).sizes_m(goal);
-    rows.into_iter().map(sizes_m).collect()
+    hypercube(&variables, DRAWS, &mut SplitMix64::new(0))
+}
+
+/// Bends of many needles along their way.
+#[derive(Debug, Clone)]
+pub(crate) struct DrawnCurves {
+    /// Fractions of the way from skin to tip.
+    pub fractions: Vec<f64>,
+    /// How far each needle is off its axis there, m, towards where its bevel pushes it.
+    pub curves_m: Vec<Vec<f64>>,
+    /// Towards where, x and y of the guide's exit at roll 0; none where that is not known.
+    pub towards: Option<Vector2<f64>>,
+}
+
+/// Fractions of a way that a curve is known at.
+const FRACTIONS: u32 = 16;
+
+/// The draws of [`drawn_bends_m`], along the whole way: the model's own factor is 1 at the skin and grows with the depth.
+///
+/// # Errors
+/// [`NoBend`].
+pub(crate) fn drawn_curves(needle: &TissueNeedle, goal: &Goal) -> Result<DrawnCurves, NoBend> {
+    let path = goal.needle_path.as_ref().ok_or(NoBend::Unknown)?;
+    let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+    needle.bends_m(&needle.medians(), path, stand_off_m)?;
+    let fractions: Vec<f64> = (0..=FRACTIONS)
+        .map(|step| f64::from(step) / f64::from(FRACTIONS))
+        .collect();
+    let curves_m = rows().into_iter().filter_map(|row| {
+        let drawn = DrawnNeedle::new(needle, &row);
+        let inserted = needle.insert(&drawn.draw, path, stand_off_m).ok()?;
+        let depth_m = path.depth_m();
+        let at = fractions.iter().map(|fraction| {
+            let more = 1.0 + (drawn.model - 1.0) * fraction;
+            bend_at_m(&inserted, fraction * depth_m) * more
+        });
+        Some(at.collect())
+    });
+    Ok(DrawnCurves {
+        curves_m: curves_m.collect(),
+        fractions,
+        towards: direction(needle, goal),
+    })
 }
 
 /// Why it is not known how a needle bends.

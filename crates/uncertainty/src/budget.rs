@@ -4,6 +4,7 @@
 mod analytic;
 mod breath;
 mod monte_carlo;
+mod path;
 mod within;
 
 use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, Vector3};
@@ -19,6 +20,7 @@ use serde::Serialize;
 use crate::bend::{Bends, NoBend};
 use crate::truth::only;
 use crate::{RestingFriction, SettleError, Source, Stage, resting_friction};
+pub use path::{PathError, path_law};
 
 /// What a budget is made for: one configuration of one goal.
 #[derive(Debug, Clone, Copy)]

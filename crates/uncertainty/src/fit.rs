@@ -3,8 +3,7 @@
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6};
 use needlebench_kinematics::Pose;
 use needlebench_kinematics::registration::{
-    Localised, RegistrationError, register, register_weighted,
-    transform_covariance,
+    Localised, RegistrationError, register, register_weighted, transform_covariance,
 };
 use needlebench_scenario::imperfections::{Localisation, Markers};
 

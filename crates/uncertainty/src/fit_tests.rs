@@ -138,7 +138,7 @@ fn simulated(
 
 fn agrees(found: &FitError, (mean, scatter, standard_error): (Vector3<f64>, Matrix3<f64>, f64)) {
     let target = Point3::from(TARGET_M);
-    let covariance = covariance_at(&found, &target);
+    let covariance = covariance_at(found, &target);
     let off = (scatter - covariance).norm() / covariance.norm();
     let expected = found.mean_at(&target);
     println!(

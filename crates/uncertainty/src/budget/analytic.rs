@@ -110,6 +110,36 @@ pub(super) fn errors(
     Ok([of_point(0, skin)?, of_point(1, target)?])
 }
 
+/// Mean and covariance of skin and target together, m and m^2, axes of the guide's exit: of first order in all that is
+/// linear, and with play as its normal of the same covariance. Without breaths and bends in tissue.
+pub(super) fn joint(
+    case: &BudgetCase<'_>,
+    imperfections: &Imperfections,
+) -> Result<(Vector6<f64>, Matrix6<f64>), BudgetError> {
+    let [skin, target] = errors(case, imperfections, None)?.map(|(_, errors)| errors);
+    let layout = Layout::new(imperfections);
+    let middle = Draw(vec![0.0; layout.len()]);
+    let truth = Truth::new(case.cell, case.place, imperfections, &layout, &middle, 0)?;
+    let joints = JointErrors::new(case, imperfections, &truth, &case.target());
+    let mut in_world_m2 = covariance(case, imperfections, &joints, &case.planned())?;
+    let from_world = case.axes_from_world();
+    let mut turn = Matrix6::zeros();
+    for at in [0, 3] {
+        turn.fixed_view_mut::<3, 3>(at, at)
+            .copy_from(from_world.matrix());
+    }
+    in_world_m2 = turn * in_world_m2 * turn.transpose();
+    // A coordinate of a uniform disc has a quarter of its radius squared.
+    let discs = skin.discs.iter().zip(&target.discs);
+    let axes =
+        discs.flat_map(|(skin, target)| [0, 1].map(|axis| [skin[axis] * 0.5, target[axis] * 0.5]));
+    let [a, b] = [skin.mean_m, target.mean_m];
+    Ok((
+        Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z),
+        in_world_m2 + squares(axes),
+    ))
+}
+
 /// Covariance of one point of two.
 fn block(joint_m2: &Matrix6<f64>, index: usize) -> Matrix3<f64> {
     joint_m2

@@ -2,6 +2,7 @@
 
 mod budget;
 mod common;
+mod path;
 mod settled;
 mod tissue;
 mod true_target;

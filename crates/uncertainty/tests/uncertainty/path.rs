@@ -1,0 +1,101 @@
+//! The law of a needle's path against arms and patients that are settled and measured as in a run.
+
+use nalgebra::{Point3, Vector3};
+use needlebench_numerics::random::SplitMix64;
+use needlebench_probability::{Body, draw};
+use needlebench_scenario::ResolvedScenario;
+use needlebench_uncertainty::budget::{BudgetCase, path_law};
+use needlebench_uncertainty::{Layout, Truth, settle_after};
+
+use crate::common::{ALL, POSTURES, imperfect, imperfect_in_tissue, motion_to, servo};
+
+const DRAWS: usize = 40_000;
+
+/// How far each needle is off at skin and tip, budget's axes, m.
+fn full_draws_m(resolved: &ResolvedScenario) -> Vec<[Vector3<f64>; 2]> {
+    let imperfections = resolved.imperfections.as_ref().expect("given");
+    let (cell, goal) = (&resolved.cell, &resolved.goals[0]);
+    let trajectory = motion_to(resolved, POSTURES[0], 0.1);
+    let servo = servo(resolved);
+    let place = resolved.phantom.as_ref();
+    let place = place.map(|placed| &placed.world_from_phantom);
+    let exit = cell.robot.world_from_flange(&POSTURES[0]) * cell.tool.flange_from_guide_exit;
+    let depths_m = [goal.standoff_m.unwrap_or(0.0), goal.insertion_length_m];
+    let planned = depths_m.map(|depth_m| exit * Point3::new(0.0, 0.0, depth_m));
+    let from_world = goal.world_from_guide_exit.rotation.inverse();
+    let layout = Layout::new(imperfections);
+    let rows = layout.hypercube(DRAWS, &mut SplitMix64::new(5));
+    let each = rows.iter().map(|row| {
+        let truth = Truth::new(cell, place, imperfections, &layout, row, 0).unwrap();
+        let settled = settle_after(&servo, &truth.dynamics(cell), &truth, &trajectory).unwrap();
+        let needle = truth.needle_points(cell, &settled.position, depths_m);
+        let wanted = truth.wanted(goal, &planned);
+        [0, 1].map(|at| from_world * (needle[at] - wanted[at]))
+    });
+    each.collect()
+}
+
+/// The same by the law.
+fn drawn_m(resolved: &ResolvedScenario) -> Vec<[Vector3<f64>; 2]> {
+    let imperfections = resolved.imperfections.as_ref().expect("given");
+    let trajectory = motion_to(resolved, POSTURES[0], 0.1);
+    let servo = servo(resolved);
+    let goal = &resolved.goals[0];
+    let case = BudgetCase::of(resolved, goal, &servo, imperfections, &trajectory);
+    let law = path_law(&case).expect("not perfect");
+    let in_budget = |along_x: Vector3<f64>| Vector3::new(along_x.y, along_x.z, along_x.x);
+    let each = (0..DRAWS as u64).map(|index| {
+        let path = draw(&law, 3, index);
+        [(0.0, Body::Wall), (1.0, Body::Lung)]
+            .map(|(fraction, body)| in_budget(path.at(&law, fraction, body)))
+    });
+    each.collect()
+}
+
+/// Of entry and tip, one number.
+type Distance = fn(&[Vector3<f64>; 2]) -> f64;
+
+#[test]
+fn entry_and_tip_go_together_as_in_runs() {
+    let tissue = "[imperfections]\n[imperfections.calibration]\n[imperfections.registration]\n\
+                  [imperfections.imaging]\n[imperfections.guide]\n[imperfections.breathing]\n[imperfections.needle]\n";
+    let cases = vec![
+        ("all", imperfect(ALL)),
+        (
+            "free",
+            imperfect(&ALL.replace("hold_failure = 0", "free = true")),
+        ),
+        ("unknown bevel", imperfect_in_tissue(tissue)),
+        (
+            "known bevel",
+            imperfect_in_tissue(&format!("{tissue}bevel = \"3:00\"\n")),
+        ),
+    ];
+    for (name, resolved) in cases {
+        let [full, law] = [full_draws_m(&resolved), drawn_m(&resolved)];
+        let of: [(&str, Distance); 5] = [
+            ("entry", |[entry, _]| entry.norm()),
+            ("tip", |[_, tip]| tip.norm()),
+            ("tip less entry", |[entry, tip]| (tip - entry).norm()),
+            ("tip and entry", |[entry, tip]| (tip + entry).norm()),
+            ("lateral", |[_, tip]| tip.xy().norm()),
+        ];
+        for (what, value) in of {
+            let sorted = [&full, &law].map(|draws| {
+                let mut values: Vec<f64> = draws.iter().map(value).collect();
+                values.sort_by(f64::total_cmp);
+                values
+            });
+            for percent in [10, 50, 90, 99] {
+                let [full_m, law_m] = sorted
+                    .each_ref()
+                    .map(|values| values[DRAWS / 100 * percent]);
+                let off = law_m / full_m - 1.0;
+                assert!(
+                    off.abs() < 0.05,
+                    "{name}, {what}, {percent} %: {full_m} {law_m}"
+                );
+            }
+        }
+    }
+}
