@@ -24,6 +24,8 @@ pub struct DrawnNeedle {
     /// Of the bevel: from where it is known to be, as a standard normal value, and where it is if that is not known, uniform in
     /// (-1, 1).
     turned: [f64; 2],
+    /// What [`DrawnNeedle::sizes_m`] are, once they are known.
+    sizes_m: Option<[f64; 2]>,
 }
 
 impl DrawnNeedle {
@@ -53,11 +55,20 @@ impl DrawnNeedle {
             draw,
             model: lognormal(&MODEL, values[2]),
             turned: [values[3], rest[kinds]],
+            sizes_m: None,
         }
+    }
+
+    /// With sizes that were found before, for the goal that it is asked of from here on.
+    pub(crate) fn know(&mut self, sizes_m: [f64; 2]) {
+        self.sizes_m = Some(sizes_m);
     }
 
     /// How far it is off a goal's axis at skin and tip, m, towards where its bevel pushes it.
     pub(crate) fn sizes_m(&self, goal: &Goal) -> [f64; 2] {
+        if let Some(sizes_m) = self.sizes_m {
+            return sizes_m;
+        }
         // A goal that is refused for the bone in its way has no needle; what can be inserted was tried with the medians.
         let bends_m = goal.needle_path.as_ref().and_then(|path| {
             let stand_off_m = goal.standoff_m.unwrap_or(0.0);

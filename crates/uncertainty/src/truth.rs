@@ -281,7 +281,7 @@ impl Layout {
         rows.into_iter().map(Draw).collect()
     }
 
-    fn of<'d>(&self, source: Source, draw: &'d Draw) -> &'d [f64] {
+    pub(crate) fn of<'d>(&self, source: Source, draw: &'d Draw) -> &'d [f64] {
         let index = Source::ALL.iter().position(|each| *each == source);
         &draw.0[self.ranges[index.expect("all sources are listed")].clone()]
     }

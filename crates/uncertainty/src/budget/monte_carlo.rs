@@ -1,5 +1,7 @@
 //! The budget by many draws: each one an arm and a patient, settled and measured as in a run.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, Vector3};
 use needlebench_kinematics::Joints;
 use needlebench_numerics::random::SplitMix64;
@@ -7,7 +9,7 @@ use needlebench_scenario::imperfections::Imperfections;
 
 use super::{BudgetCase, BudgetError, Moments};
 use crate::jitter::Jitter;
-use crate::{Draw, Layout, Truth, settle};
+use crate::{Bending, Draw, DrawnNeedle, Layout, Source, Truth, settle};
 
 /// Moments at skin and target, and the two distances, m, between which the one is that 95 % of all draws stay within,
 /// with a confidence of 95 %.
@@ -41,8 +43,12 @@ pub(super) fn moments(
     );
 
     let mut errors: [Vec<Vector3<f64>>; 2] = std::array::from_fn(|_| Vec::with_capacity(samples));
-    for (draw, trembling) in draws.iter().zip(&jitter) {
-        let truth = Truth::new(case.cell, case.place, imperfections, &layout, draw, 0)?;
+    let bends_m = bends_m(case, imperfections, &layout, &draws);
+    for (index, (draw, trembling)) in draws.iter().zip(&jitter).enumerate() {
+        let mut truth = Truth::new(case.cell, case.place, imperfections, &layout, draw, 0)?;
+        if let (Some(bends_m), Bending::Tissue(needle)) = (&bends_m, &mut truth.bending) {
+            needle.know(bends_m[index]);
+        }
         let real = truth.dynamics(case.cell);
         let settled = settle(case.servo, &real, &truth, friction.as_ref(), &target)?;
         let position = settled.position + trembling;
@@ -66,6 +72,28 @@ pub(super) fn moments(
             between(&distances, 0.95),
         )
     }))
+}
+
+/// How far the needle of each draw is off the goal's axis, m: the same in all configurations. None for one that does not bend
+/// in tissue.
+fn bends_m(
+    case: &BudgetCase<'_>,
+    imperfections: &Imperfections,
+    layout: &Layout,
+    draws: &[Draw],
+) -> Option<Arc<[[f64; 2]]>> {
+    let (needle, goal) = (imperfections.tissue()?, case.goal);
+    let values = |draw| layout.of(Source::Needle, draw);
+    let first = values(draws.first()?);
+    let solve = || {
+        let each = draws
+            .iter()
+            .map(|draw| DrawnNeedle::new(needle, values(draw)));
+        each.map(|drawn| drawn.sizes_m(goal)).collect()
+    };
+    let stand_off_m = goal.standoff_m.unwrap_or(0.0);
+    let path = goal.needle_path.as_ref()?;
+    Some(path.drawn_m(needle, stand_off_m, (first, draws.len()), solve))
 }
 
 /// The order statistics between which a quantile is with a confidence of 95 %: how many of independent draws are below it

@@ -1,7 +1,7 @@
 //! The needle as a beam, in air or in tissue.
 
 use std::path::Path;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use needlebench_cell::Tool;
 use needlebench_input::{Finding, Location, ModelSource, TomlText, from_toml, source_of};
@@ -55,6 +55,8 @@ pub struct NeedlePath {
     pub turn_at_m: Option<f64>,
     /// What was drawn of it.
     known: KnownBends,
+    /// What was drawn of it with all else.
+    drawn: DrawnBends,
 }
 
 /// Bends that were drawn of one needle at one stand-off: they are the same in all configurations, wherever the patient lies.
@@ -66,6 +68,37 @@ struct Drawn {
     needle: TissueNeedle,
     stand_off_m: f64,
     bends_m: Arc<[Vec<f64>; 2]>,
+}
+
+/// Bends of draws that a budget takes: the same in all configurations. What they were drawn for stands first.
+#[derive(Debug, Default)]
+struct DrawnBends(Mutex<Vec<DrawnOnce>>);
+
+#[derive(Debug)]
+struct DrawnOnce {
+    of: DrawnFor,
+    bends_m: Arc<[[f64; 2]]>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct DrawnFor {
+    needle: TissueNeedle,
+    stand_off_m: f64,
+    first: Vec<f64>,
+    count: usize,
+}
+
+/// Bends are drawn anew for a copy: what it is copied for is another needle, mostly.
+impl Clone for DrawnBends {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl PartialEq for DrawnBends {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// They say nothing that the path does not say, and so all are equal.
@@ -88,6 +121,7 @@ impl NeedlePath {
             clock,
             turn_at_m: None,
             known: KnownBends::default(),
+            drawn: DrawnBends::default(),
         }
     }
 
@@ -103,6 +137,45 @@ impl NeedlePath {
     /// From the skin to the tip, m.
     pub fn depth_m(&self) -> f64 {
         self.layers.iter().map(|layer| layer.length_m).sum()
+    }
+
+    /// Bends at skin and tip, m, of each of many draws: those of a needle at a stand-off are solved once, for all whose first row
+    /// of values is the same and who are as many.
+    ///
+    /// # Panics
+    /// Where another thread has panicked while it had them.
+    pub fn drawn_m(
+        &self,
+        needle: &TissueNeedle,
+        stand_off_m: f64,
+        (first, count): (&[f64], usize),
+        solve: impl FnOnce() -> Vec<[f64; 2]>,
+    ) -> Arc<[[f64; 2]]> {
+        let key = DrawnFor {
+            needle: needle.clone(),
+            stand_off_m,
+            first: first.to_vec(),
+            count,
+        };
+        let all = || self.drawn.0.lock().expect("nobody panics with them");
+        let known = |all: &[DrawnOnce]| {
+            let found = all.iter().find(|each| each.of == key)?;
+            Some(Arc::clone(&found.bends_m))
+        };
+        if let Some(bends_m) = known(&all()) {
+            return bends_m;
+        }
+        // Not while others wait: two that solve the same find the same.
+        let bends_m: Arc<[[f64; 2]]> = solve().into();
+        let mut all = all();
+        if let Some(bends_m) = known(&all) {
+            return bends_m;
+        }
+        all.push(DrawnOnce {
+            of: key.clone(),
+            bends_m: Arc::clone(&bends_m),
+        });
+        bends_m
     }
 
     /// Bends at skin and tip as `draw` has them, m: drawn once for the needle and the stand-off that are asked for first.
