@@ -59,6 +59,7 @@ pub(crate) fn analytic_budget(moments: [Moments; 2]) -> ErrorBudget {
             basis: None,
             at_skin,
             at_target,
+            skin_with_target: None,
         },
         dominant: None,
         before_insertion: None,

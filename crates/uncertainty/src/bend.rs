@@ -7,7 +7,9 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use needlebench_insertion::{Factor, MODEL};
 use needlebench_numerics::random::SplitMix64;
 use needlebench_scenario::Goal;
-use needlebench_scenario::imperfections::{NeedleDraw, TissueError, TissueNeedle, bend_at_m};
+use needlebench_scenario::imperfections::{
+    Bends as DrawnBends, NeedleDraw, TissueError, TissueNeedle, bend_at_m,
+};
 
 use crate::distribution::{Variable, hypercube};
 
@@ -174,8 +176,7 @@ pub enum NoBend {
 /// Bends of many needles in many patients at one goal.
 #[derive(Debug, Clone)]
 pub(crate) struct Bends {
-    /// At skin and tip, m, the least first.
-    sizes_m: Arc<[Vec<f64>; 2]>,
+    drawn: Arc<DrawnBends>,
     /// The mean direction and, a quarter further, the one across it, guide's exit at roll 0; and the standard deviation of
     /// the angle, rad, or none where any angle is as likely.
     axes: [Vector2<f64>; 2],
@@ -193,18 +194,13 @@ impl Bends {
         let path = goal.needle_path.as_ref().ok_or(NoBend::Unknown)?;
         let stand_off_m = goal.standoff_m.unwrap_or(0.0);
         needle.bends_m(&needle.medians(), path, stand_off_m)?;
-        let sizes_m = path.bends_m(needle, stand_off_m, || {
-            let drawn_m = drawn_bends_m(needle, goal);
-            [0, 1].map(|index| {
-                let mut all_m: Vec<f64> = drawn_m.iter().map(|both_m| both_m[index]).collect();
-                all_m.sort_by(f64::total_cmp);
-                all_m
-            })
+        let drawn = path.bends(needle, stand_off_m, || {
+            DrawnBends::new(&drawn_bends_m(needle, goal))
         });
         let towards = direction(needle, goal);
         let from = towards.unwrap_or_else(Vector2::x);
         Ok(Self {
-            sizes_m,
+            drawn,
             axes: [from, across(&from)],
             spread_rad: towards.map(|_| needle.bevel_spread_rad),
             aim_m: (goal.world_from_guide_exit.rotation.inverse() * goal.aim_m).xy(),
@@ -216,7 +212,7 @@ impl Bends {
         let aim_m = [Vector2::zeros(), self.aim_m][index];
         Bend {
             aim_m: turn(Vector3::new(aim_m.x, aim_m.y, 0.0)),
-            sizes_m: Arc::clone(&self.sizes_m),
+            drawn: Arc::clone(&self.drawn),
             index,
             axes: self
                 .axes
@@ -229,9 +225,8 @@ impl Bends {
 /// Bends at one place.
 #[derive(Debug, Clone)]
 pub(crate) struct Bend {
-    /// At skin and tip.
-    sizes_m: Arc<[Vec<f64>; 2]>,
-    /// Of which this is.
+    drawn: Arc<DrawnBends>,
+    /// At skin (0) or tip (1).
     index: usize,
     axes: [Vector3<f64>; 2],
     spread_rad: Option<f64>,
@@ -251,31 +246,42 @@ impl Bend {
 
     /// Mean and covariance, m, m^2.
     pub fn moments(&self) -> (Vector3<f64>, Matrix3<f64>) {
-        let sizes_m = &self.sizes_m[self.index];
-        let count = sizes_m.len() as f64;
-        let mean_m = sizes_m.iter().sum::<f64>() / count;
-        let square_m2 = sizes_m.iter().map(|size| size * size).sum::<f64>() / count;
+        let sizes_m = &self.drawn.sorted_m[self.index];
+        let square_m2 = sizes_m.iter().map(|size| size * size).sum::<f64>() / sizes_m.len() as f64;
+        let mean = self.mean();
+        (
+            self.aim_m + mean,
+            self.second() * square_m2 - mean * mean.transpose(),
+        )
+    }
+
+    /// Mean of the bend itself, m: of a normal angle E cos; none of any angle.
+    fn mean(&self) -> Vector3<f64> {
+        let Some(spread_rad) = self.spread_rad else {
+            return Vector3::zeros();
+        };
+        let sizes_m = &self.drawn.sorted_m[self.index];
+        let mean_m = sizes_m.iter().sum::<f64>() / sizes_m.len() as f64;
+        self.axes[0] * (mean_m * libm::exp(-0.5 * spread_rad * spread_rad))
+    }
+
+    /// Mean square of its direction: of a normal angle E cos^2 and E sin^2.
+    fn second(&self) -> Matrix3<f64> {
         let squares = self.axes.map(|axis| axis * axis.transpose());
-        match self.spread_rad {
-            None => (self.aim_m, (squares[0] + squares[1]) * (0.5 * square_m2)),
-            Some(spread_rad) => {
-                // Of a normal angle: E cos, E cos^2, E sin^2.
-                let shrunk = libm::exp(-0.5 * spread_rad * spread_rad);
-                let twice = libm::exp(-2.0 * spread_rad * spread_rad);
-                let mean = self.axes[0] * (mean_m * shrunk);
-                let second =
-                    squares[0] * (0.5 * (1.0 + twice)) + squares[1] * (0.5 * (1.0 - twice));
-                (
-                    self.aim_m + mean,
-                    second * square_m2 - mean * mean.transpose(),
-                )
-            }
-        }
+        let twice = self
+            .spread_rad
+            .map_or(0.0, |spread_rad| libm::exp(-2.0 * spread_rad * spread_rad));
+        squares[0] * (0.5 * (1.0 + twice)) + squares[1] * (0.5 * (1.0 - twice))
+    }
+
+    /// Covariance of the bend at the skin with that at the tip, m^2: one needle, one direction.
+    pub fn with_tip(&self, tip: &Self) -> Matrix3<f64> {
+        self.second() * self.drawn.product_m2 - self.mean() * tip.mean().transpose()
     }
 
     /// The bend at two shares of all, each in (0, 1): of its size, and of its direction.
     pub fn quantile(&self, [size, angle]: [f64; 2]) -> Vector3<f64> {
-        let sizes_m = &self.sizes_m[self.index];
+        let sizes_m = &self.drawn.sorted_m[self.index];
         let at = size * sizes_m.len() as f64 - 0.5;
         let last = sizes_m.len() - 1;
         let below = at.clamp(0.0, last as f64);

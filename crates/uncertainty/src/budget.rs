@@ -145,9 +145,7 @@ impl Moments {
         let across = |k: usize| bias[k] * bias[k] + covariance[(k, k)];
         Self {
             bias_m: (*bias).into(),
-            covariance_m2: std::array::from_fn(|row| {
-                std::array::from_fn(|column| covariance[(row, column)])
-            }),
+            covariance_m2: rows(covariance),
             rms_m: (bias.norm_squared() + covariance.trace()).sqrt(),
             lateral_rms_m: (across(0) + across(1)).sqrt(),
         }
@@ -219,6 +217,23 @@ pub struct SourceBudget {
     pub at_skin: PointBudget,
     /// Needle's tip at the end of the insertion.
     pub at_target: PointBudget,
+    /// How both go together; none where their moments alone are known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub skin_with_target: Option<CrossBudget>,
+}
+
+/// Covariance of what is off at the skin with what is off at the target, m^2, row by row: rows are of the skin.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CrossBudget {
+    /// By Jacobians.
+    pub analytic_m2: [[f64; 3]; 3],
+    /// By many draws; none if no samples were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub monte_carlo_m2: Option<[[f64; 3]; 3]>,
+}
+
+fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
 }
 
 impl SourceBudget {
@@ -377,6 +392,8 @@ fn source_budget(
         |source| only(case.imperfections, |each| each == source),
     );
     let errors = analytic::errors(case, &imperfections, bends)?;
+    let [(_, skin), (_, target)] = &errors;
+    let cross = analytic::cross(case, &imperfections, [skin, target])?;
     let sampled = if samples > 1 {
         Some(monte_carlo::moments(case, &imperfections, samples, seed)?)
     } else {
@@ -385,7 +402,7 @@ fn source_budget(
     let point = |index: usize| {
         let (analytic, errors) = &errors[index];
         let analytic = *analytic;
-        let sampled = sampled.map(|both| both[index]);
+        let sampled = sampled.as_ref().map(|drawn| drawn.points[index]);
         let size = analytic.covariance().norm();
         PointBudget {
             analytic,
@@ -404,6 +421,10 @@ fn source_budget(
         basis: source.and_then(|source| basis(source, case.imperfections)),
         at_skin: point(0),
         at_target: point(1),
+        skin_with_target: Some(CrossBudget {
+            analytic_m2: rows(&cross),
+            monte_carlo_m2: sampled.as_ref().map(|drawn| rows(&drawn.cross_m2)),
+        }),
     })
 }
 

@@ -73,6 +73,7 @@ fn budget(rms_m: f64) -> ErrorBudget {
             basis: None,
             at_skin: point(),
             at_target: point(),
+            skin_with_target: None,
         },
         dominant: None,
         before_insertion: Some(moments),

@@ -331,6 +331,7 @@ mod tests {
             basis: None,
             at_skin: point(0.8 * rms_m),
             at_target: point(rms_m),
+            skin_with_target: None,
         }
     }
 

@@ -9,6 +9,7 @@ use needlebench_scenario::imperfections::{
     AbsorbedSag, ArmPopulation, Imperfections, NeedleBending, OriginDeviations,
 };
 
+use super::breath::breath_moments;
 use super::within::Errors;
 use super::{BudgetCase, BudgetError, Moments};
 use crate::bend::Bends;
@@ -30,6 +31,25 @@ pub(super) fn moments(
     bends: Option<&Bends>,
 ) -> Result<[Moments; 2], BudgetError> {
     Ok(errors(case, imperfections, bends)?.map(|(moments, _)| moments))
+}
+
+/// Covariance of what is off at the skin with what is off at the target, axes of the guide's exit, m^2.
+pub(super) fn cross(
+    case: &BudgetCase<'_>,
+    imperfections: &Imperfections,
+    [skin, target]: [&Errors; 2],
+) -> Result<Matrix3<f64>, BudgetError> {
+    let (_, joint_m2) = joint_of(case, imperfections, [skin, target])?;
+    let mut sum = joint_m2.fixed_view::<3, 3>(0, 3).into_owned();
+    // Each breath has one phase for both.
+    for ((skin_m, breathing), (target_m, _)) in skin.breaths.iter().zip(&target.breaths) {
+        let (_, variance) = breath_moments(breathing);
+        sum += skin_m * target_m.transpose() * variance;
+    }
+    if let (Some(skin), Some(target)) = (&skin.bend, &target.bend) {
+        sum += skin.with_tip(target);
+    }
+    Ok(sum)
 }
 
 /// The same, with how what is off is distributed.
@@ -117,6 +137,14 @@ pub(super) fn joint(
     imperfections: &Imperfections,
 ) -> Result<(Vector6<f64>, Matrix6<f64>), BudgetError> {
     let [skin, target] = errors(case, imperfections, None)?.map(|(_, errors)| errors);
+    joint_of(case, imperfections, [&skin, &target])
+}
+
+fn joint_of(
+    case: &BudgetCase<'_>,
+    imperfections: &Imperfections,
+    [skin, target]: [&Errors; 2],
+) -> Result<(Vector6<f64>, Matrix6<f64>), BudgetError> {
     let layout = Layout::new(imperfections);
     let middle = Draw(vec![0.0; layout.len()]);
     let truth = Truth::new(case.cell, case.place, imperfections, &layout, &middle, 0)?;

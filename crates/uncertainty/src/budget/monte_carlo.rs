@@ -11,6 +11,15 @@ use super::{BudgetCase, BudgetError, Moments};
 use crate::jitter::Jitter;
 use crate::{Bending, Draw, DrawnNeedle, Layout, Source, Truth, settle};
 
+/// What many draws say.
+pub(super) struct Drawn {
+    /// At skin and target: moments, and the two distances, m, between which the one is that 95 % of all draws stay within,
+    /// with a confidence of 95 %.
+    pub points: [(Moments, [f64; 2]); 2],
+    /// Covariance of what is off at the skin with what is off at the target, m^2.
+    pub cross_m2: Matrix3<f64>,
+}
+
 /// Moments at skin and target, and the two distances, m, between which the one is that 95 % of all draws stay within,
 /// with a confidence of 95 %.
 pub(super) fn moments(
@@ -18,7 +27,7 @@ pub(super) fn moments(
     imperfections: &Imperfections,
     samples: usize,
     seed: u64,
-) -> Result<[(Moments, [f64; 2]); 2], BudgetError> {
+) -> Result<Drawn, BudgetError> {
     let layout = Layout::new(imperfections);
     let mut random = SplitMix64::new(seed);
     let draws = layout.hypercube(samples, &mut random);
@@ -58,8 +67,16 @@ pub(super) fn moments(
             errors.push(from_world * (needle - wanted));
         }
     }
-    Ok(errors.map(|errors| {
-        let count = errors.len() as f64;
+    let count = samples as f64;
+    let means = errors
+        .each_ref()
+        .map(|errors| errors.iter().sum::<Vector3<f64>>() / count);
+    let both = errors[0].iter().zip(&errors[1]);
+    let cross: Matrix3<f64> = both
+        .map(|(skin, target)| (skin - means[0]) * (target - means[1]).transpose())
+        .sum();
+    let cross_m2 = cross / (count - 1.0);
+    let points = errors.map(|errors| {
         let mean = errors.iter().sum::<Vector3<f64>>() / count;
         let scatter: Matrix3<f64> = errors
             .iter()
@@ -71,7 +88,8 @@ pub(super) fn moments(
             Moments::new(&mean, &(scatter / (count - 1.0))),
             between(&distances, 0.95),
         )
-    }))
+    });
+    Ok(Drawn { points, cross_m2 })
 }
 
 /// How far the needle of each draw is off the goal's axis, m: the same in all configurations. None for one that does not bend

@@ -1,10 +1,10 @@
 //! The law of a needle's path against arms and patients that are settled and measured as in a run.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_numerics::random::SplitMix64;
 use needlebench_probability::{Body, draw};
 use needlebench_scenario::ResolvedScenario;
-use needlebench_uncertainty::budget::{BudgetCase, path_law};
+use needlebench_uncertainty::budget::{BudgetCase, Samples, budget, path_law};
 use needlebench_uncertainty::{Layout, Truth, settle_after};
 
 use crate::common::{ALL, POSTURES, imperfect, imperfect_in_tissue, motion_to, servo};
@@ -54,6 +54,47 @@ fn drawn_m(resolved: &ResolvedScenario) -> Vec<[Vector3<f64>; 2]> {
 
 /// Of entry and tip, one number.
 type Distance = fn(&[Vector3<f64>; 2]) -> f64;
+
+/// By Jacobians, and by other draws.
+#[test]
+fn covariances_of_entry_with_tip_are_those_of_draws() {
+    let tissue = "[imperfections.guide]\n[imperfections.needle]\n";
+    let cases = vec![
+        ("all", imperfect(ALL)),
+        (
+            "breath",
+            imperfect("[imperfections.breathing]\nfree = true\n"),
+        ),
+        ("play", imperfect("[imperfections.guide]\n")),
+        ("unknown bevel", imperfect_in_tissue(tissue)),
+        (
+            "known bevel",
+            imperfect_in_tissue(&format!(
+                "{tissue}bevel = \"3:00\"\nbevel_spread_deg = 30\n"
+            )),
+        ),
+    ];
+    for (name, resolved) in cases {
+        let imperfections = resolved.imperfections.as_ref().expect("given");
+        let trajectory = motion_to(&resolved, POSTURES[0], 0.1);
+        let (servo, goal) = (servo(&resolved), &resolved.goals[0]);
+        let case = BudgetCase::of(&resolved, goal, &servo, imperfections, &trajectory);
+        let samples = Samples {
+            total: 20_000,
+            each_source: 0,
+        };
+        let total = budget(&case, samples, 7).expect("a budget").total;
+        let cross = total.skin_with_target.expect("of a whole budget");
+        let matrix = |rows: [[f64; 3]; 3]| Matrix3::from_fn(|row, column| rows[row][column]);
+        let apart = matrix(cross.analytic_m2) - matrix(cross.monte_carlo_m2.expect("drawn"));
+        let [skin, target] =
+            [total.at_skin, total.at_target].map(|point| point.analytic.covariance().norm());
+        let off = apart.norm() / (skin * target).sqrt();
+        assert!(off < 0.07, "{name}: {off}");
+        let size = matrix(cross.analytic_m2).norm() / (skin * target).sqrt();
+        assert!(size > 0.3, "{name}: {size}");
+    }
+}
 
 #[test]
 fn entry_and_tip_go_together_as_in_runs() {

@@ -13,8 +13,8 @@ pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
 pub use localised::{Localisation, Markers, TargetLocalisation};
 pub use needle::{
-    Aim, Cantilever, Carried, NeedleBending, NeedleDraw, NeedlePath, TissueError, TissueNeedle,
-    Turn, bend_at_m, bends_along_m,
+    Aim, Bends, Cantilever, Carried, NeedleBending, NeedleDraw, NeedlePath, TissueError,
+    TissueNeedle, Turn, bend_at_m, bends_along_m,
 };
 pub use needlebench_cell::GearTwist;
 

@@ -67,7 +67,33 @@ struct KnownBends(OnceLock<Drawn>);
 struct Drawn {
     needle: TissueNeedle,
     stand_off_m: f64,
-    bends_m: Arc<[Vec<f64>; 2]>,
+    bends: Arc<Bends>,
+}
+
+/// Bends of many needles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bends {
+    /// At skin and tip, m, the least first.
+    pub sorted_m: [Vec<f64>; 2],
+    /// Mean of the product of both, m^2.
+    pub product_m2: f64,
+}
+
+impl Bends {
+    /// Of bends at skin and tip, m.
+    pub fn new(drawn_m: &[[f64; 2]]) -> Self {
+        let products = drawn_m.iter().map(|[skin_m, tip_m]| skin_m * tip_m);
+        let product_m2 = products.sum::<f64>() / drawn_m.len() as f64;
+        let sorted_m = [0, 1].map(|index| {
+            let mut all_m: Vec<f64> = drawn_m.iter().map(|both_m| both_m[index]).collect();
+            all_m.sort_by(f64::total_cmp);
+            all_m
+        });
+        Self {
+            sorted_m,
+            product_m2,
+        }
+    }
 }
 
 /// Bends of draws that a budget takes: the same in all configurations. What they were drawn for stands first.
@@ -179,19 +205,19 @@ impl NeedlePath {
     }
 
     /// Bends at skin and tip as `draw` has them, m: drawn once for the needle and the stand-off that are asked for first.
-    pub fn bends_m(
+    pub fn bends(
         &self,
         needle: &TissueNeedle,
         stand_off_m: f64,
-        draw: impl Fn() -> [Vec<f64>; 2],
-    ) -> Arc<[Vec<f64>; 2]> {
+        draw: impl Fn() -> Bends,
+    ) -> Arc<Bends> {
         let known = self.known.0.get_or_init(|| Drawn {
             needle: needle.clone(),
             stand_off_m,
-            bends_m: Arc::new(draw()),
+            bends: Arc::new(draw()),
         });
         if known.needle == *needle && known.stand_off_m == stand_off_m {
-            Arc::clone(&known.bends_m)
+            Arc::clone(&known.bends)
         } else {
             Arc::new(draw())
         }
