@@ -218,19 +218,21 @@ fn aimed_rms_m(
     path: &NeedlePath,
     sizes_m: &[f64],
 ) -> Option<f64> {
+    // Towards where the tip is pushed: a turned needle may end on the other side.
     let aim_m = if needle.is_aimed {
-        goal.aim_m.norm()
+        let [x, y] = needle.pushed_towards(path)?;
+        let towards = goal.world_from_guide_exit.rotation * Vector3::new(x, y, 0.0);
+        -goal.aim_m.dot(&towards)
     } else {
         needle
             .mean_bend_m(path, goal.standoff_m.unwrap_or(0.0))
             .ok()?
-            .abs()
     };
     let mean_m = sizes_m.iter().sum::<f64>() / sizes_m.len() as f64;
     // The mean of a direction that is normal about the known one is shorter than 1.
     let shrunk = libm::exp(-0.5 * needle.bevel_spread_rad * needle.bevel_spread_rad);
     let square_m2 = rms_m(sizes_m) * rms_m(sizes_m);
-    let left_m2 = square_m2 - 2.0 * aim_m * mean_m.abs() * shrunk + aim_m * aim_m;
+    let left_m2 = square_m2 - 2.0 * aim_m * mean_m * shrunk + aim_m * aim_m;
     Some(left_m2.max(0.0).sqrt())
 }
 

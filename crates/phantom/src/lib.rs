@@ -306,6 +306,16 @@ impl Phantom {
         self.route_obstacles.of(&self.parts)
     }
 
+    /// The bones that a place (phantom frame, m) is in, by the structures that they belong to, else by their own names.
+    pub fn bones_at(&self, place: &Point3<f64>) -> impl Iterator<Item = &str> {
+        let obstacles = self.route_obstacles();
+        let parts = obstacles.parts.iter().enumerate();
+        let around = parts.filter(move |(index, part)| {
+            part.tissue == Tissue::Bone && obstacles.solids.contains(*index, place)
+        });
+        around.map(|(_, part)| part.organ.as_deref().unwrap_or(&part.name))
+    }
+
     /// The organ that contains a point (phantom frame): that of the lesion around it, else the one whose solid holds it.
     pub fn organ_at(&self, point: &Point3<f64>) -> Option<String> {
         self.lesions

@@ -183,11 +183,7 @@ impl<'p, 'g> Entered<'p, 'g> {
         let mut entered: Vec<String> = goal.target_organ.iter().cloned().collect();
         if goal.lesion.is_some() {
             let target = placed.world_from_phantom.inverse() * goal.target_m;
-            let obstacles = placed.phantom.route_obstacles();
-            let holding = obstacles.parts.iter().enumerate().filter(|(index, part)| {
-                part.tissue == Tissue::Bone && obstacles.solids.contains(*index, &target)
-            });
-            entered.extend(holding.map(|(_, part)| organ_of(part).to_owned()));
+            entered.extend(placed.phantom.bones_at(&target).map(str::to_owned));
         }
         entered
     }

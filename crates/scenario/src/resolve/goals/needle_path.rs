@@ -305,17 +305,6 @@ pub(crate) fn check_insertions(
     Ok(())
 }
 
-/// The bones that a place in the world is in.
-fn bones_around<'p>(
-    placed: &'p PlacedPhantom,
-    place: &Point3<f64>,
-) -> impl Iterator<Item = &'p str> {
-    let at = placed.world_from_phantom.inverse() * place;
-    let parts = placed.phantom.parts.iter();
-    let around = parts.filter(move |part| part.tissue == Tissue::Bone && part.solid.contains(&at));
-    around.map(|part| part.organ.as_ref().unwrap_or(&part.name).as_str())
-}
-
 /// Inserts the median needle of a goal: what is to be noted, or why it cannot be inserted. A goal whose way is not known has
 /// no needle to insert where it is refused for the bone in it.
 fn inserted(
@@ -331,9 +320,10 @@ fn inserted(
         });
         let is_refused = ways.is_some_and(|(placed, [entry, tip])| {
             let mut bones = placed.phantom.bones_met(&entry, &tip);
+            let target = placed.world_from_phantom.inverse() * goal.target_m;
             // A route may enter the bone that its lesion is in.
             let holding: Vec<&str> = match goal.lesion {
-                Some(_) => bones_around(placed, &goal.target_m).collect(),
+                Some(_) => placed.phantom.bones_at(&target).collect(),
                 None => Vec::new(),
             };
             bones.any(|bone| {
