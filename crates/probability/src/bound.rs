@@ -8,6 +8,8 @@ mod mixture;
 mod planes;
 mod stations;
 
+pub(crate) use stations::OfBodies;
+
 use crate::case::{Anatomy, Case};
 use crate::event::{Event, EventError};
 

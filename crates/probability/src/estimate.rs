@@ -8,6 +8,7 @@ use crate::influence::{Influence, Origin, Reweighting};
 use crate::interval::{
     Difference, Interval, SIDES, share_interval, standard_error, weighted_interval,
 };
+use crate::words::LEAST_PRINTED;
 
 /// Most draws of an estimate.
 pub const MOST_DRAWS: u64 = 1_000_000;
@@ -117,7 +118,7 @@ pub enum EstimateError {
 /// What [`crate::at_most`] says enough of need not be asked: structures that no draw comes near take all draws.
 ///
 /// Draws in blocks of 10 000 until the interval is within 10 % of the probability, or all are done; an event below
-/// 1e-3 is sampled by its importance. An estimate does not depend on which others are asked for.
+/// 1e-3 is sampled by its importance, until that or until it is below what is printed as a number. An estimate does not depend on which others are asked for.
 ///
 /// # Errors
 /// [`EstimateError`].
@@ -225,10 +226,12 @@ impl Sums {
         self.effective_size() >= LEAST_SIZE && self.largest <= LARGEST_WEIGHT * self.weight
     }
 
-    /// Whether they are enough.
+    /// Whether they are enough: for a number, or to say that it is too small for one.
     fn is_enough_moved(&self) -> bool {
         let error = standard_error(self.weight, self.square, self.draws);
-        self.can_tell() && SIDES * error <= WITHIN * self.share()
+        let is_small =
+            || weighted_interval(self.weight, self.square, self.draws).high < LEAST_PRINTED;
+        self.can_tell() && (SIDES * error <= WITHIN * self.share() || is_small())
     }
 }
 

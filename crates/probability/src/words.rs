@@ -1,6 +1,5 @@
 //! Probabilities in words: counts of needles.
 
-use crate::bound::Bound;
 use crate::estimate::{Estimate, Told};
 
 /// Nothing below this is printed as a number.
@@ -27,9 +26,9 @@ pub fn estimate_label(estimate: &Estimate) -> String {
     }
 }
 
-/// A bound as a count of 1000 needles: `at most 14`.
-pub fn bound_label(bound: &Bound) -> String {
-    format!("at most {}", count_above(bound.probability))
+/// An upper bound of a probability as a count of 1000 needles: `at most 14`.
+pub fn bound_label(at_most: f64) -> String {
+    format!("at most {}", count_above(at_most))
 }
 
 /// A count with two digits of `like`, at most whole needles: intervals have the digits of what they are of.

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use needlebench_numerics::normal;
 
-use super::mixture::{Cells, Normal, fullnesses, normals};
+use super::mixture::{Cells, Normal, PHASES, fullnesses, normals};
 use crate::breath::Body;
 use crate::case::{Anatomy, Case};
 
@@ -73,6 +73,24 @@ pub(super) fn tail(
     distance_m: f64,
     boundary_sd_m: f64,
 ) -> f64 {
+    let fullnesses = fullnesses(PHASES);
+    tail_of(
+        states,
+        axis,
+        (bends, &fullnesses),
+        distance_m,
+        boundary_sd_m,
+    )
+}
+
+/// The same with these cells of the bend, and of the fullness of a failed hold.
+pub(super) fn tail_of(
+    states: &[Normal],
+    axis: &Vector3<f64>,
+    (bends, fullnesses): (&[(f64, f64)], &[(f64, [f64; 2])]),
+    distance_m: f64,
+    boundary_sd_m: f64,
+) -> f64 {
     let of_state = |state: &Normal| -> f64 {
         let variance_m2 = axis.dot(&(state.covariance_m2 * axis)) + boundary_sd_m * boundary_sd_m;
         let sd_m = variance_m2.max(0.0).sqrt();
@@ -90,9 +108,9 @@ pub(super) fn tail(
             || vec![(1.0, 0.0)],
             |full| {
                 let most_m = axis.dot(&full);
-                let cells = fullnesses().into_iter();
+                let cells = fullnesses.iter();
                 let largest =
-                    cells.map(|(share, ends)| (share, (most_m * ends[0]).max(most_m * ends[1])));
+                    cells.map(|(share, ends)| (*share, (most_m * ends[0]).max(most_m * ends[1])));
                 largest.collect()
             },
         );

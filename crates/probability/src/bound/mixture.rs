@@ -70,7 +70,7 @@ const TURN_EDGES: f64 = 5.0;
 const TURN_CELLS: u32 = 40;
 
 /// Cells of the phase of a failed hold; its second half is the mirror image of the first.
-const PHASES: u32 = 128;
+pub(super) const PHASES: u32 = 128;
 
 /// A law that is normal: one state of the breath at a station.
 pub(super) struct Normal {
@@ -140,14 +140,14 @@ pub(super) fn turns(direction: BendDirection) -> Vec<Turns> {
 }
 
 /// Values of fullness of a breath, sin^4(pi u) of a uniform phase, as cells: their probabilities and both ends.
-pub(super) fn fullnesses() -> Vec<(f64, [f64; 2])> {
+pub(super) fn fullnesses(count: u32) -> Vec<(f64, [f64; 2])> {
     let at = |cell: u32| {
-        let sine = libm::sin(0.5 * PI * f64::from(cell) / f64::from(PHASES));
+        let sine = libm::sin(0.5 * PI * f64::from(cell) / f64::from(count));
         let square = sine * sine;
         square * square
     };
-    (0..PHASES)
-        .map(|cell| (f64::from(PHASES).recip(), [at(cell), at(cell + 1)]))
+    (0..count)
+        .map(|cell| (f64::from(count).recip(), [at(cell), at(cell + 1)]))
         .collect()
 }
 
@@ -176,6 +176,47 @@ pub(super) fn binned(values: impl Iterator<Item = (f64, f64)> + Clone, count: us
     }
     cells.retain(|(probability, _)| *probability > 0.0);
     cells
+}
+
+/// Bends at a fraction that stand for all of them: how likely, where, and how far the curve is off what it is taken for, m.
+/// Where any turn is as likely, those of like size are one, of the largest size.
+pub(super) fn bends_at(
+    bend: &Bend,
+    fraction: f64,
+    off_m: impl Fn(usize) -> f64,
+) -> Vec<(f64, Vector2<f64>, f64)> {
+    /// Sizes.
+    const SIZES: usize = 48;
+    let share = (bend.count() as f64).recip();
+    let each = (0..bend.count()).map(|curve| (share, bend.at(curve, fraction), off_m(curve)));
+    if bend.direction() != BendDirection::Unknown {
+        return each.collect();
+    }
+    let all: Vec<(f64, Vector2<f64>, f64)> = each.collect();
+    let largest_m = all
+        .iter()
+        .map(|(_, bent, _)| bent.norm())
+        .fold(0.0, f64::max);
+    let mut sizes = vec![(0.0, 0.0_f64, 0.0_f64); SIZES];
+    for (share, bent, off_m) in all {
+        let size_m = bent.norm();
+        let cell = crate::draw::nth(
+            SIZES,
+            if largest_m > 0.0 {
+                size_m / largest_m
+            } else {
+                0.0
+            },
+        );
+        let (likely, most_m, most_off_m) = &mut sizes[cell];
+        *likely += share;
+        *most_m = most_m.max(size_m);
+        *most_off_m = most_off_m.max(off_m);
+    }
+    let found = sizes.into_iter().filter(|(likely, ..)| *likely > 0.0);
+    found
+        .map(|(likely, size_m, off_m)| (likely, Vector2::new(size_m, 0.0), off_m))
+        .collect()
 }
 
 /// Curves of a bend at some fractions, and how far each is off its chord between the first and the last at most, m.

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 use needlebench_numerics::normal;
 
-use super::along::{Along, tail};
-use super::mixture::{Between, Cells, binned, normals, off_chord_m, turns};
+use super::along::{Along, tail, tail_of};
+use super::mixture::{Between, Cells, bends_at, binned, fullnesses, normals, off_chord_m, turns};
 use crate::bend::{BendDirection, turned};
 use crate::breath::Body;
 use crate::case::{Anatomy, Case};
@@ -63,9 +63,10 @@ fn about<A: Anatomy>(
     needed_m: f64,
 ) -> f64 {
     /// Shares of the curves, by their size, and of a full turn or of the standard deviation of a turn.
-    const SIZES: [f64; 3] = [0.2, 0.7, 0.97];
-    const ANGLES: [f64; 6] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+    const SIZES: [f64; 2] = [0.5, 0.97];
+    const ANGLES: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
     let seen = &case.structures[structure];
+    let fullnesses = fullnesses(4);
     let towards = Vector3::new(0.0, plane.normal.x, plane.normal.y);
     let ends = plane
         .stretch_m
@@ -76,8 +77,8 @@ fn about<A: Anatomy>(
             || vec![(1.0, 0.0)],
             |bend| {
                 let turn = |angle: f64| match bend.direction() {
-                    BendDirection::Known { spread_rad } => spread_rad * (0.4 * angle - 1.0),
-                    BendDirection::Unknown => TAU * angle / 6.0,
+                    BendDirection::Known { spread_rad } => spread_rad * (angle - 1.5),
+                    BendDirection::Unknown => TAU * angle / 4.0,
                 };
                 let pairs = SIZES
                     .iter()
@@ -93,10 +94,10 @@ fn about<A: Anatomy>(
                 each.collect()
             },
         );
-        tail(
+        tail_of(
             &states,
             &towards,
-            &bends,
+            (&bends, &fullnesses),
             plane.offset_m - needed_m,
             seen.boundary_sd_m,
         )
@@ -171,12 +172,11 @@ fn bends(law: &Law, towards: &Vector3<f64>, fraction: f64, ends: [f64; 2]) -> Ce
         return vec![(1.0, 0.0)];
     };
     let turns = turns(bend.direction());
-    let share = (bend.count() as f64).recip();
-    let values: Vec<(f64, f64)> = (0..bend.count())
-        .flat_map(|curve| {
-            let off_m = off_chord_m(bend, curve, ends);
-            let value = bend.at(curve, fraction);
-            let between = Between::new(value, towards.yz());
+    let curves = bends_at(bend, fraction, |curve| off_chord_m(bend, curve, ends));
+    let values: Vec<(f64, f64)> = curves
+        .iter()
+        .flat_map(|(share, value, off_m)| {
+            let between = Between::new(*value, towards.yz());
             let size_m = value.norm();
             turns.iter().map(move |cell| {
                 let most_m = size_m * cell.largest_cosine(&between);

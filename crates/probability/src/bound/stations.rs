@@ -4,14 +4,17 @@
 //! that far to both sides, and how likely it is off by more is added.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+use std::sync::OnceLock;
 
 use nalgebra::{Matrix3, Vector2};
 use needlebench_numerics::normal;
 
 use super::along::Along;
 use super::mixture::{
-    Between, Cells, Normal, Turns, binned, fullnesses, normals, off_chord_m, turns,
+    Between, Cells, Normal, PHASES, Turns, bends_at, binned, fullnesses, normals, off_chord_m,
+    turns,
 };
+use crate::breath::Body;
 use crate::case::{Anatomy, Case};
 use crate::law::Law;
 
@@ -35,20 +38,42 @@ const BOUNDARY: (f64, f64, f64) = (-1.5, 7.0, 0.5);
 /// Standard deviations along the needle that are looked to both sides: the best of them.
 const BESIDE: [f64; 3] = [4.0, 5.5, 8.0];
 
+/// How far the needle is off at all stations relative to a body, and how far its bend is off its chords.
+struct Stations {
+    all: Vec<Station>,
+    /// Of the stretches of each cut, m.
+    bent_m: Vec<Vec<f64>>,
+}
+
+/// Those of both bodies, found when first asked for.
+#[derive(Default)]
+pub(crate) struct OfBodies([OnceLock<Stations>; 2]);
+
+impl OfBodies {
+    fn of(&self, law: &Law, end: f64, body: Body) -> &Stations {
+        self.0[body.index()].get_or_init(|| {
+            let fraction = |station: usize| end * station as f64 / STRETCHES as f64;
+            let cut = |merged: usize| {
+                let stretches = 0..STRETCHES / merged;
+                let ends = stretches.map(|each| [each * merged, (each + 1) * merged].map(fraction));
+                ends.map(|ends| bent_m(law, ends)).collect()
+            };
+            Stations {
+                all: (0..=STRETCHES)
+                    .map(|station| Station::new(law, fraction(station), body))
+                    .collect(),
+                bent_m: MERGED.into_iter().map(cut).collect(),
+            }
+        })
+    }
+}
+
 /// `P(|e(s)| > least clearance of both stretches beside s)`, summed over the stations s.
 pub(super) fn bound<A: Anatomy>(case: &Case<'_, A>, structure: usize, margin_m: f64) -> f64 {
     let seen = &case.structures[structure];
     let needed_m = case.needle.radius_m + margin_m;
     let fraction = |station: usize| case.end() * station as f64 / STRETCHES as f64;
-    let all: Vec<Station> = (0..=STRETCHES)
-        .map(|station| Station::new(case.law, fraction(station), seen.body))
-        .collect();
-    let bent_m = MERGED.map(|merged| {
-        let stretches = 0..STRETCHES / merged;
-        let ends = stretches.map(|each| [each * merged, (each + 1) * merged].map(fraction));
-        ends.map(|ends| bent_m(case.law, ends))
-            .collect::<Vec<f64>>()
-    });
+    let Stations { all, bent_m } = case.stations.of(case.law, case.end(), seen.body);
     let shifts = boundary_cells(seen.boundary_sd_m);
     let along = Along::new(case, seen.body);
     let mut best = 1.0_f64;
@@ -61,7 +86,7 @@ pub(super) fn bound<A: Anatomy>(case: &Case<'_, A>, structure: usize, margin_m: 
     for beside_m in looked {
         let beyond = along.beyond(case, seen.body, beside_m);
         let beside = beside_m / case.needle.depth_m;
-        for (merged, bent_m) in MERGED.into_iter().zip(&bent_m) {
+        for (merged, bent_m) in MERGED.into_iter().zip(bent_m) {
             let clear_m: Vec<f64> = bent_m
                 .iter()
                 .enumerate()
@@ -186,7 +211,7 @@ struct State {
 }
 
 impl Station {
-    fn new(law: &Law, fraction: f64, body: crate::breath::Body) -> Self {
+    fn new(law: &Law, fraction: f64, body: Body) -> Self {
         let turns = law
             .bend()
             .map(|bend| turns(bend.direction()))
@@ -283,15 +308,15 @@ fn means_m(law: &Law, fraction: f64, state: &Normal, turns: &[Turns]) -> Cells {
             Some(full) => failed_m(&lateral, &full.yz(), &[(1.0, 0.0)]),
         };
     };
-    let share = (bend.count() as f64).recip();
+    let bends = bends_at(bend, fraction, |_| 0.0);
     if let Some(full) = &state.failed_m {
-        let sizes_m = (0..bend.count()).map(|curve| (share, bend.at(curve, fraction).norm()));
+        let sizes_m = bends.iter().map(|(share, bent, _)| (*share, bent.norm()));
         return failed_m(&lateral, &full.yz(), &binned(sizes_m, FAILED.0));
     }
-    let values: Vec<(f64, f64)> = (0..bend.count())
-        .flat_map(|curve| {
-            let bent = bend.at(curve, fraction);
-            let between = Between::new(bent, lateral);
+    let values: Vec<(f64, f64)> = bends
+        .iter()
+        .flat_map(|(share, bent, _)| {
+            let between = Between::new(*bent, lateral);
             turns.iter().map(move |cell| {
                 let product = bent.norm() * lateral.norm() * cell.largest_cosine(&between);
                 let square = lateral.norm_squared() + bent.norm_squared() + 2.0 * product;
@@ -304,7 +329,7 @@ fn means_m(law: &Law, fraction: f64, state: &Normal, turns: &[Turns]) -> Cells {
 
 /// The same of a failed hold, with a bend in whatever direction.
 fn failed_m(mean_m: &Vector2<f64>, full_m: &Vector2<f64>, bends_m: &[(f64, f64)]) -> Cells {
-    let values: Vec<(f64, f64)> = fullnesses()
+    let values: Vec<(f64, f64)> = fullnesses(PHASES)
         .into_iter()
         .flat_map(|(share, ends)| {
             let most_m = ends.map(|fullness| (mean_m + full_m * fullness).norm());

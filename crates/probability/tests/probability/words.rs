@@ -1,8 +1,6 @@
 //! Counts of 1000 needles.
 
-use needlebench_probability::{
-    Bound, BoundKind, Estimate, Interval, Method, Told, bound_label, estimate_label,
-};
+use needlebench_probability::{Estimate, Interval, Method, Told, bound_label, estimate_label};
 
 fn found(told: Told, probability: Option<f64>, low: f64, high: f64) -> String {
     estimate_label(&Estimate {
@@ -51,12 +49,7 @@ fn nothing_below_a_millionth_is_a_number() {
 
 #[test]
 fn bounds_are_rounded_up() {
-    let at_most = |probability| {
-        bound_label(&Bound {
-            probability,
-            kind: BoundKind::Stations,
-        })
-    };
+    let at_most = bound_label;
     assert_eq!(at_most(0.01301), "at most 14");
     assert_eq!(at_most(0.9e-3), "at most 0.90");
     assert_eq!(at_most(0.8812e-3), "at most 0.89");
