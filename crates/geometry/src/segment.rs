@@ -92,6 +92,19 @@ impl PreparedSolids {
         self.to(index, &here, &Pose::identity()).distance_m <= 0.0
     }
 
+    /// Signed distance of a point of the parent's frame from the nearest of some of them, m; infinite from none of them.
+    /// Within several that overlap it is as deep as in the one that it is deepest in.
+    pub fn distance_to_point_m(&self, some: &[usize], point: &Point3<f64>) -> f64 {
+        let here = Segment::new(point, point, 0.0);
+        some.iter().fold(f64::INFINITY, |least_m, index| {
+            if self.1[*index].gap_to_point_m(point) > least_m + PRUNING_MARGIN_M {
+                return least_m;
+            }
+            let to = self.to(*index, &here, &Pose::identity());
+            least_m.min(to.distance_m)
+        })
+    }
+
     /// [`segment_clearance`] from these solids.
     pub fn segment_clearance(
         &self,

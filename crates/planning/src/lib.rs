@@ -33,6 +33,7 @@ pub use press::{PressError, PressPlan, stage_press};
 pub use reach::out_of_reach_m;
 pub use rejection::Rejection;
 pub use route::{
-    RouteClearance, RouteJudgement, bent_route, crossed_fissures, judge_route, judge_route_beside,
-    judged_straight, judged_tissues, needle_route, route_rejection,
+    NeedleStructure, RouteClearance, RouteJudgement, bent_route, crossed_fissures, judge_route,
+    judge_route_beside, judged_straight, judged_tissues, needle_route, needle_structures,
+    route_rejection,
 };

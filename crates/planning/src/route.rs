@@ -1,6 +1,7 @@
 //! What the planned needle passes on its way from the skin to its end.
 
 use std::cell::OnceCell;
+use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 use needlebench_cell::{Cell, ClearanceClass, Rule, part_in_words};
@@ -153,6 +154,45 @@ pub fn bent_route<'a>(
     nearest_along(needle_radius_m(cell), placed, points, &entered, |part| {
         part.tissue != Tissue::Fissure
     })
+}
+
+/// A structure that the needle of a goal keeps away from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NeedleStructure<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Bone, vessel or organ.
+    pub tissue: Tissue,
+    /// Its parts, by their numbers among the phantom's route obstacles.
+    pub parts: Vec<usize>,
+}
+
+/// Structures that the needle of a goal keeps away from, in the order of the phantom's parts.
+pub fn needle_structures<'a>(
+    section: &NeedleRouteSection,
+    placed: &'a PlacedPhantom,
+    goal: &Goal,
+) -> Vec<NeedleStructure<'a>> {
+    let entered = Entered::new(placed, goal);
+    let mut structures: Vec<NeedleStructure<'_>> = Vec::new();
+    let mut numbers = BTreeMap::new();
+    let parts = placed.phantom.route_obstacles().parts.iter().enumerate();
+    let kept = parts.filter(|(_, part)| {
+        margin_m(section, part.tissue).is_some() && !is_off(section, part) && !entered.is(part)
+    });
+    for (index, part) in kept {
+        let key = (organ_of(part), part.tissue);
+        let number = *numbers.entry(key).or_insert_with(|| {
+            structures.push(NeedleStructure {
+                name: key.0,
+                tissue: key.1,
+                parts: Vec::new(),
+            });
+            structures.len() - 1
+        });
+        structures[number].parts.push(index);
+    }
+    structures
 }
 
 /// Structures that the needle must enter: the organ of the target, and what holds the lesion that it is aimed at, such
