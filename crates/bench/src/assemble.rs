@@ -32,6 +32,7 @@ use crate::adjudication::Adjudicated;
 use crate::budgets::Budgets;
 use crate::events::{EventRun, events_report};
 use crate::needle::needle_report;
+use crate::probability::Probabilities;
 use crate::provenance::provenance;
 use crate::setup::Setup;
 use crate::simulate::EngineRun;
@@ -43,6 +44,7 @@ pub(crate) struct Results<'a> {
     pub runs: &'a [Vec<Vec<EngineRun>>],
     pub events: &'a [EventRun],
     pub budgets: &'a Budgets,
+    pub probabilities: Probabilities,
     /// By goal and configuration.
     pub adjudicated: &'a [Vec<Adjudicated>],
     /// Engines that were to measure everything.
@@ -84,6 +86,16 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
             ..goal_report(&context, index, plan, runs, adjudicated)
         })
         .collect();
+    let probabilities = results.probabilities.into_iter().flatten();
+    let configurations = goals.iter_mut().flat_map(|goal| &mut goal.configurations);
+    for (configuration, found) in configurations.zip(probabilities) {
+        match found {
+            Some(Ok(found)) => configuration.probability = Some(found),
+            Some(Err(error)) => configuration.probability_failure = Some(error),
+            None => {}
+        }
+        set_measured(configuration);
+    }
     let (verdict, judged) = judge(
         &mut goals,
         &resolved.goals,

@@ -21,7 +21,7 @@ pub(crate) fn budgets(setup: &Setup<'_>, plans: &[GoalPlan], threads: usize) -> 
     let seed = setup.resolved.scenario.seed;
     let expected = setup.resolved.expected.as_ref();
     let is_own = expected.is_some_and(|expected| expected.class.is_none());
-    of_each(setup, plans, threads, |case| {
+    of_each(setup, plans, threads, |_, case| {
         let total = case.imperfections.budget_samples;
         let each_source = if is_own { total } else { 0 };
         budget(case, Samples { total, each_source }, seed).map_err(|error| error.to_string())
@@ -31,7 +31,7 @@ pub(crate) fn budgets(setup: &Setup<'_>, plans: &[GoalPlan], threads: usize) -> 
 /// The same of all sources together alone; drawn where engines have run, as a run's are.
 pub(crate) fn total_budgets(setup: &Setup<'_>, plans: &[GoalPlan], is_drawn: bool) -> Budgets {
     let seed = setup.resolved.scenario.seed;
-    of_each(setup, plans, 1, |case| {
+    of_each(setup, plans, 1, |_, case| {
         let samples = if is_drawn {
             case.imperfections.budget_samples
         } else {
@@ -69,12 +69,14 @@ pub(crate) fn analytic_budget(moments: [Moments; 2]) -> ErrorBudget {
     }
 }
 
-fn of_each(
+/// What `of` says of every configuration with a motion, by goal and configuration; nothing without an arm and patient
+/// population.
+pub(crate) fn of_each<T: Send>(
     setup: &Setup<'_>,
     plans: &[GoalPlan],
     threads: usize,
-    budget: impl Fn(&BudgetCase<'_>) -> Result<ErrorBudget, String> + Sync,
-) -> Budgets {
+    of: impl Fn(usize, &BudgetCase<'_>) -> T + Sync,
+) -> Vec<Vec<Option<T>>> {
     let resolved = setup.resolved;
     let Some(Expected { imperfections, .. }) = &resolved.expected else {
         return plans
@@ -87,11 +89,11 @@ fn of_each(
         .enumerate()
         .flat_map(|(goal, plan)| plan.configurations.iter().map(move |each| (goal, each)))
         .collect();
-    let mut found = in_parallel(threads, &all, |(goal, plan)| {
+    let mut found = in_parallel(threads, &all, |(index, plan)| {
         let trajectory = plan.trajectory.as_ref()?;
-        let goal = &resolved.goals[*goal];
+        let goal = &resolved.goals[*index];
         let case = BudgetCase::of(resolved, goal, &setup.servo, imperfections, trajectory);
-        Some(budget(&case))
+        Some(of(*index, &case))
     })
     .into_iter();
     plans

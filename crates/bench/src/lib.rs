@@ -26,6 +26,7 @@ pub mod motion;
 mod needle;
 mod plan;
 pub mod preview;
+mod probability;
 pub mod provenance;
 mod ranked;
 mod real_cell;

@@ -28,6 +28,7 @@ use crate::events::{self, EventRun};
 use crate::excitation;
 use crate::iso9283;
 use crate::plan::{Job, Planned, plan_goals};
+use crate::probability::probabilities;
 use crate::rtde::RtdeSource;
 use crate::runnable::Runnable;
 use crate::scenario_run::{RealArm, RunError, RunOptions, ScenarioRun, StoppedRun};
@@ -286,12 +287,15 @@ pub(crate) fn run_goals(
     );
     let budgets = budgets(&setup, plans, control.threads);
     tracing::info!("error budgets computed");
+    let probabilities = probabilities(&setup, plans, control.threads);
+    tracing::info!("probabilities estimated");
     let interrupted = control.is_cancelled();
     let results = Results {
         plans,
         runs: &runs,
         events: &events,
         budgets: &budgets,
+        probabilities,
         adjudicated: &adjudications.by_goal,
         engines: &engine_names(engines),
         failures,

@@ -200,10 +200,19 @@ pub fn check_configuration(
         judged.results.extend(of_envelope);
     }
     for checked in others {
-        judged.add(result(checked), || match &configuration.budget_failure {
-            Some(failure) => format!("no error budget: {failure}"),
-            None => "not measured".to_owned(),
+        let is_probability = checked.metric.key.ends_with("_probability");
+        judged.add(result(checked), || {
+            let budget = configuration.budget_failure.as_ref();
+            let budget = budget.map(|failure| format!("no error budget: {failure}"));
+            let own = configuration.probability_failure.clone();
+            let own = own.filter(|_| is_probability);
+            own.or(budget).unwrap_or_else(|| "not measured".to_owned())
         });
+    }
+    if let Some(probability) = &configuration.probability {
+        for (key, reason) in probability.undecided(criteria) {
+            judged.set_open(missing(None, key, reason));
+        }
     }
     if configuration.engines.is_empty() && !absent.is_empty() {
         // What is known of the plan was to be judged by the simulated motion.

@@ -20,6 +20,7 @@ pub mod metric;
 mod motion;
 mod needle;
 pub mod pareto;
+pub mod probability;
 mod provenance;
 pub mod ranking;
 mod ranking_report;

@@ -17,6 +17,7 @@ use crate::iso9283::Iso9283Report;
 use crate::judged::JudgedReport;
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
+use crate::probability::ProbabilityReport;
 use crate::ranking_report::{Dominance, GoalRanking, RankingReport};
 use crate::referee::RefereeReport;
 use crate::room::RoomReport;
@@ -508,6 +509,12 @@ pub struct ConfigurationReport {
     pub budget: Option<ErrorBudget>,
     /// Why there is no budget, where there should be one.
     pub budget_failure: Option<String>,
+    /// How likely the needle meets what, and reaches the lesion; none without a patient or imperfections.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probability: Option<ProbabilityReport>,
+    /// Why it is not known, where it should be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probability_failure: Option<String>,
     /// Everything that was measured, in SI units, with the unit at the end of the name: `tip_rms_m`.
     pub measured: BTreeMap<String, f64>,
     /// The same by the keys of the [metrics](crate::metric), as the command line and `[ranking]` use them. The same
@@ -556,6 +563,8 @@ impl ConfigurationReport {
             ranking: None,
             budget: None,
             budget_failure: None,
+            probability: None,
+            probability_failure: None,
             measured: BTreeMap::new(),
             metrics: BTreeMap::new(),
             files: Vec::new(),

@@ -113,6 +113,18 @@ impl Judged {
         }
     }
 
+    /// The same whatever its result: the value is not known well enough.
+    pub(crate) fn set_open(&mut self, open: NotJudged) {
+        let is_other = |criterion: &str, goal: &str, label: &Option<String>| {
+            criterion != open.criterion || goal != open.goal || *label != open.label
+        };
+        self.results
+            .retain(|each| is_other(&each.criterion, &each.goal, &each.label));
+        self.not_judged
+            .retain(|each| is_other(&each.criterion, &each.goal, &each.label));
+        self.not_judged.push(open);
+    }
+
     /// Adds those of a part.
     pub fn extend(&mut self, other: Self) {
         self.results.extend(other.results);

@@ -60,6 +60,25 @@ pub struct ClearanceCriteria {
     pub needle_route: Option<f64>,
 }
 
+/// Maximum probability that the needle's surface comes closer than 1 mm to a structure, 0 to 1. A tissue without a limit,
+/// or `"off"`, is not evaluated.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct StructureCriteria {
+    /// To a bone.
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0), extend("x-off" = true))]
+    pub bone: Option<f64>,
+    /// To a vessel.
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0), extend("x-off" = true))]
+    pub vessel: Option<f64>,
+    /// To an organ that does not contain the target.
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0), extend("x-off" = true))]
+    pub organ: Option<f64>,
+}
+
 impl ClearanceCriteria {
     /// Minimum clearance of a class, mm; `None` if it is not evaluated.
     pub fn least_mm(&self, class: ClearanceClass) -> Option<f64> {
@@ -104,6 +123,13 @@ pub struct CriteriaSection {
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_tip_lateral_rms_mm: Option<f64>,
+    /// Minimum probability that the needle's tip is in the lesion, over the same population, 0 to 1. Goals that are no
+    /// lesion are not evaluated.
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0), extend("x-off" = true))]
+    pub min_lesion_probability: Option<f64>,
+    /// Maximum probability that the needle comes closer than 1 mm to any single structure, over the same population.
+    pub max_structure_probability: StructureCriteria,
     /// Maximum settled angle between planned and actual needle axis, deg.
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 1e-12, max = 90.0), extend("x-off" = true))]
@@ -161,6 +187,8 @@ impl Default for CriteriaSection {
             max_true_target_lateral_mm: None,
             max_tip_rms_mm: None,
             max_tip_lateral_rms_mm: None,
+            min_lesion_probability: None,
+            max_structure_probability: StructureCriteria::default(),
             max_needle_angle_error_deg: Some(0.05),
             max_guide_position_error_mm: None,
             max_settling_time_s: None,

@@ -4,17 +4,43 @@ use needlebench_scenario::scenario::CriteriaSection;
 use needlebench_scenario::study::StudyMode::Dynamic;
 
 use super::{ALL, MM, NEEDLE_RESOLUTION_M, UNSIMULATED};
-use crate::metric::entry::Better::Less;
+use crate::metric::entry::Better::{Less, More};
 use crate::metric::entry::Bound::Value;
 use crate::metric::entry::Draw::{OverBudget, ThisDraw};
 use crate::metric::entry::Precision::Fine;
 use crate::metric::entry::Source::{Configuration, Engines};
 use crate::metric::entry::Stage::{FinalPosture, Simulated};
 use crate::metric::entry::{Metric, Missing, Role, Show, Statistics};
-use crate::metric::quantity::Quantity::{Angle, Length};
+use crate::metric::quantity::Quantity::{Angle, Length, Ratio};
 use crate::metric::readers::budget;
 
 const NEEDLE_RESOLUTION_RAD: f64 = 1e-5;
+
+/// Of estimates whose intervals are a tenth of them.
+const PROBABILITY_RESOLUTION: f64 = 1e-6;
+
+/// How likely the needle comes close to what of one tissue it most likely does.
+macro_rules! structure_probability {
+    ($key:literal, $words:literal, $definition:literal, $criterion:literal, $tissue:ident) => {
+        Metric::new(
+            $key,
+            $words,
+            $definition,
+            Ratio,
+            Configuration(|each| each.probability.as_ref()?.value_of(stringify!($tissue))),
+        )
+        .only_in(&[])
+        .known(Value, OverBudget, FinalPosture)
+        .better(Less, PROBABILITY_RESOLUTION)
+        .criterion($criterion, &[Dynamic], |criteria| {
+            criteria.max_structure_probability.$tissue
+        })
+        .detail(|each, _, _| {
+            let all = each.probability.as_ref();
+            all.map_or_else(String::new, |all| all.words_of(stringify!($tissue)))
+        })
+    };
+}
 
 // Limits of what is judged by the prediction where nothing is simulated.
 
@@ -406,6 +432,44 @@ pub(super) const BUDGET: &[Metric] = &[
     .summary(1, "P95 tip error")
     .page(1, "P95 tip error")
     .page_side(1, "P95 tip error"),
+    Metric::new(
+        "lesion_probability",
+        "tip in the lesion",
+        "probability that the needle tip is in the lesion, over the arm and patient population: estimate by draws",
+        Ratio,
+        Configuration(|each| each.probability.as_ref()?.in_lesion.as_ref()?.event.probability),
+    )
+    .only_in(&[])
+    .known(Value, OverBudget, FinalPosture)
+    .better(More, PROBABILITY_RESOLUTION)
+    .criterion("min_lesion_probability", &[Dynamic], |criteria| {
+        criteria.min_lesion_probability
+    })
+    .detail(|each, _, _| {
+        let lesion = each.probability.as_ref().and_then(|all| all.in_lesion.as_ref());
+        lesion.map_or_else(String::new, |lesion| lesion.event.in_words())
+    }),
+    structure_probability!(
+        "bone_probability",
+        "needle close to bone",
+        "probability that the needle comes closer than 1 mm to the bone that it most likely does",
+        "max_structure_probability.bone",
+        bone
+    ),
+    structure_probability!(
+        "vessel_probability",
+        "needle close to a vessel",
+        "probability that the needle comes closer than 1 mm to the vessel that it most likely does",
+        "max_structure_probability.vessel",
+        vessel
+    ),
+    structure_probability!(
+        "organ_probability",
+        "needle close to an organ",
+        "probability that the needle comes closer than 1 mm to the organ that it most likely does, without that of the target",
+        "max_structure_probability.organ",
+        organ
+    ),
     Metric::new(
         "tip_bias",
         "tip bias",

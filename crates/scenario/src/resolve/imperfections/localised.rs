@@ -60,6 +60,8 @@ pub struct TargetLocalisation {
     pub root_m: Matrix3<f64>,
     /// Whether it was measured, and not assumed.
     pub is_measured: bool,
+    /// Voxel of the image, along the axes of the phantom frame, m.
+    pub voxel_m: Vector3<f64>,
 }
 
 impl TargetLocalisation {
@@ -68,6 +70,7 @@ impl TargetLocalisation {
         Self {
             root_m: measured.map_or_else(|| assumed_root_m(block), root),
             is_measured: measured.is_some(),
+            voxel_m: Vector3::from(block.voxel_mm) * 1e-3,
         }
     }
 }

@@ -1,0 +1,410 @@
+//! How likely a configuration's needle comes too close to structures, and its tip is in the lesion.
+
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+use needlebench_evaluation::probability::{
+    EventProbability, LesionProbability, ProbabilityReport, StructureProbability,
+};
+use needlebench_geometry::PreparedSolids;
+use needlebench_kinematics::Pose;
+use needlebench_phantom::{Phantom, Tissue};
+use needlebench_planning::{GoalPlan, NeedleStructure, needle_structures};
+use needlebench_probability::{
+    Anatomy, Body, Case, Draws, Estimate, Event, HalfPlane, LEAST_PRINTED, Law, Needle, Origin,
+    Structure, Told, at_most, bound_label, estimate, estimate_label,
+};
+use needlebench_scenario::imperfections::Imperfections;
+use needlebench_scenario::{Goal, ResolvedScenario};
+use needlebench_uncertainty::Source;
+use needlebench_uncertainty::budget::{BudgetCase, path_law};
+
+use crate::budgets::of_each;
+use crate::setup::Setup;
+
+/// How close is too close, m (assumed).
+const MARGIN_M: f64 = 1e-3;
+
+/// The tip is to come so near to its point, m.
+const POINT_M: f64 = 2e-3;
+
+/// Structures that are farther from the planned needle count together, m.
+const NEAR_M: f64 = 20e-3;
+
+/// Standard deviations of boundaries that they are taken to be nearer by: none is by more (6e-16).
+const FAR: f64 = 8.0;
+
+/// Most draws of an estimate.
+const DRAWS: u64 = 200_000;
+
+/// Solids are taken for triangles that are farther inside by no more, m.
+const CHORD_M: f64 = 1e-4;
+
+/// Standard deviation of where a bone's boundary is seen in slices of 1 mm and of 5 mm, m: of ribs, measured on synthetic
+/// scans of the shipped chests; in between and beyond along the line through both.
+const BONE_SD_M: [f64; 2] = [0.21e-3, 0.68e-3];
+const SLICES_M: [f64; 2] = [1e-3, 5e-3];
+
+/// Probabilities by goal and configuration, for every configuration with a motion in a patient, and what went wrong where there
+/// are none.
+pub(crate) type Probabilities = Vec<Vec<Option<Result<ProbabilityReport, String>>>>;
+
+/// Of all configurations that have a motion.
+pub(crate) fn probabilities(
+    setup: &Setup<'_>,
+    plans: &[GoalPlan],
+    threads: usize,
+) -> Probabilities {
+    let resolved = setup.resolved;
+    let goals = resolved.goals.iter();
+    let goals: Vec<Option<Surroundings<'_>>> = goals
+        .map(|goal| Surroundings::new(resolved, goal))
+        .collect();
+    let draws = Draws {
+        seed: resolved.scenario.seed,
+        most: DRAWS,
+        threads: 1,
+    };
+    let found = of_each(setup, plans, threads, |goal, case| {
+        Some(goals[goal].as_ref()?.of(case, &draws))
+    });
+    let flat = |each: Vec<Option<Option<_>>>| each.into_iter().map(Option::flatten).collect();
+    found.into_iter().map(flat).collect()
+}
+
+/// What is about a goal's needle: the same for all configurations.
+struct Surroundings<'a> {
+    /// Structures that are near, with their distances from the planned needle's surface, m.
+    near: Vec<(NeedleStructure<'a>, f64)>,
+    /// How many others there are.
+    others: usize,
+    /// Those that are near, all others together as far as they move with the chest wall and with the lung, the target, and the
+    /// lesion.
+    structures: Vec<Structure>,
+    around: Around<'a>,
+    needle: Needle,
+    lesion: Option<(String, f64)>,
+}
+
+/// Structures in the frame of the needle.
+struct Around<'a> {
+    solids: &'a PreparedSolids,
+    phantom_from_needle: Pose,
+    places: Vec<Place>,
+}
+
+enum Place {
+    /// Parts of the phantom.
+    Parts(Vec<usize>),
+    /// Farther than that from the axis of the planned needle, entry to tip.
+    Beyond { distance_m: f64, depth_m: f64 },
+    /// Within a radius of a point, m.
+    Ball(Point3<f64>, f64),
+}
+
+impl Anatomy for Around<'_> {
+    fn distance_m(&self, structure: usize, point_m: &Point3<f64>) -> f64 {
+        match &self.places[structure] {
+            Place::Parts(parts) => {
+                let point = self.phantom_from_needle * point_m;
+                self.solids.distance_to_point_m(parts, &point)
+            }
+            Place::Beyond {
+                distance_m,
+                depth_m,
+            } => {
+                let on_axis = Point3::new(point_m.x.clamp(0.0, *depth_m), 0.0, 0.0);
+                distance_m - (point_m - on_axis).norm()
+            }
+            Place::Ball(middle, radius_m) => (point_m - middle).norm() - radius_m,
+        }
+    }
+}
+
+/// Pose of the needle's frame in the world: x along the guide's axis from the planned entry point, y and z along x and y of the
+/// guide's exit at roll 0.
+fn world_from_needle(goal: &Goal, entry: &Point3<f64>) -> Pose {
+    let axes = goal.world_from_guide_exit.rotation.to_rotation_matrix();
+    let [x, y, z] = [0, 1, 2].map(|column| axes.matrix().column(column).into_owned());
+    let turned = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[z, x, y]));
+    Pose::from_parts(entry.coords.into(), turned.into())
+}
+
+impl<'a> Surroundings<'a> {
+    /// None for a goal without a patient.
+    fn new(resolved: &'a ResolvedScenario, goal: &'a Goal) -> Option<Self> {
+        let placed = resolved.phantom.as_ref()?;
+        let phantom = &placed.phantom;
+        let solids = &phantom.route_obstacles().solids;
+        let entry = goal.entry_m?;
+        let section = &resolved.scenario.planning.needle_route;
+        let seen = Boundaries::of(&resolved.expected.as_ref()?.imperfections);
+        let world_from_needle = world_from_needle(goal, &entry);
+        let phantom_from_needle = placed.world_from_phantom.inverse() * world_from_needle;
+        let needle_from_world = world_from_needle.inverse();
+        let needle = Needle {
+            depth_m: goal.insertion_length_m - goal.standoff_m.unwrap_or(0.0),
+            throw_m: 0.0,
+            radius_m: 0.5 * resolved.cell.tool.needle.outer_diameter_m,
+        };
+        let tip = entry + goal.axis.into_inner() * needle.depth_m;
+        let distance_m = |obstacle: &NeedleStructure<'_>| {
+            let wanted = |index: usize| obstacle.parts.contains(&index);
+            let place = &placed.world_from_phantom;
+            solids
+                .nearest_to_segment(&entry, &tip, needle.radius_m, place, wanted)
+                .map_or(f64::INFINITY, |(_, to)| to.distance_m)
+        };
+        let obstacles = needle_structures(section, placed, goal).into_iter();
+        let all: Vec<(NeedleStructure<'_>, f64)> = obstacles
+            .map(|each| {
+                let distance_m = distance_m(&each);
+                (each, distance_m)
+            })
+            .collect();
+        let (near, others): (Vec<_>, Vec<_>) = all
+            .into_iter()
+            .partition(|(_, distance_m)| *distance_m < NEAR_M);
+        let mut structures = Vec::new();
+        let mut places = Vec::new();
+        let mut add = |name: &str, body, boundary_sd_m, covers, place| {
+            structures.push(Structure {
+                name: name.to_owned(),
+                body,
+                boundary_sd_m,
+                covers,
+            });
+            places.push(place);
+        };
+        for (obstacle, _) in &near {
+            let parts = &phantom.route_obstacles().parts;
+            let names = obstacle.parts.iter().map(|part| &parts[*part].name);
+            let surfaces: Vec<Vec<Point3<f64>>> =
+                names.map(|name| corners_of(phantom, name)).collect();
+            let body = body_of(obstacle.tissue, &surfaces, phantom);
+            let corners = surfaces.into_iter().flatten();
+            let corners: Vec<Point3<f64>> = corners
+                .map(|corner| phantom_from_needle.inverse() * corner)
+                .collect();
+            let covers = HalfPlane::covers(&corners, 3, CHORD_M);
+            let place = Place::Parts(obstacle.parts.clone());
+            add(
+                obstacle.name,
+                body,
+                seen.of_m(obstacle.tissue),
+                covers,
+                place,
+            );
+        }
+        let distance_m = NEAR_M + needle.radius_m - FAR * seen.soft_m.max(seen.bone_m);
+        for body in [Body::Wall, Body::Lung] {
+            let depth_m = needle.depth_m;
+            let place = Place::Beyond {
+                distance_m,
+                depth_m,
+            };
+            add("others", body, 0.0, Vec::new(), place);
+        }
+        let target = Place::Ball(needle_from_world * goal.target_m, POINT_M);
+        add("target", Body::Lung, 0.0, Vec::new(), target);
+        let lesions = phantom.lesions.iter();
+        let mut lesions = lesions.filter(|lesion| goal.lesion.as_ref() == Some(&lesion.name));
+        let lesion = lesions.next().map(|lesion| {
+            let middle = needle_from_world * (placed.world_from_phantom * lesion.center_m);
+            let place = Place::Ball(middle, 0.5 * lesion.diameter_m);
+            add(&lesion.name, Body::Lung, seen.soft_m, Vec::new(), place);
+            (lesion.name.clone(), lesion.diameter_m)
+        });
+        Some(Self {
+            near,
+            others: others.len(),
+            structures,
+            around: Around {
+                solids,
+                phantom_from_needle,
+                places,
+            },
+            needle,
+            lesion,
+        })
+    }
+
+    /// Probabilities of a configuration's needle.
+    ///
+    /// # Errors
+    /// A sentence.
+    fn of(&self, case: &BudgetCase<'_>, draws: &Draws) -> Result<ProbabilityReport, String> {
+        let law = path_law(case).map_err(|error| error.to_string())?;
+        let about = Case::new(&law, self.needle, &self.structures, &self.around)
+            .map_err(|error| error.to_string())?;
+        let count = self.near.len();
+        let closer = |structure: usize| Event::Closer {
+            structure,
+            margin_m: MARGIN_M,
+        };
+        let bound = |event: &Event| -> Result<f64, String> {
+            let bound = at_most(&about, event).map_err(|error| error.to_string())?;
+            Ok(bound.map_or(1.0, |bound| bound.probability))
+        };
+        let each = (0..count + 2).map(|index| bound(&closer(index)));
+        let bounds: Vec<f64> = each.collect::<Result<_, String>>()?;
+        let (told, left): (Vec<usize>, Vec<usize>) =
+            (0..count).partition(|index| bounds[*index] >= LEAST_PRINTED);
+        let mut events: Vec<Event> = told.iter().copied().map(closer).collect();
+        events.push(Event::Any {
+            structures: told.clone(),
+            margin_m: MARGIN_M,
+        });
+        let inside = |structure: usize| Event::TipInside { structure };
+        events.push(inside(count + 2));
+        events.extend(self.lesion.iter().map(|_| inside(count + 3)));
+        let found = estimate(&about, &events, draws).map_err(|error| error.to_string())?;
+        let (of_structures, others) = found.split_at(told.len());
+        let [any, within_2_mm, in_lesion @ ..] = others else {
+            return Err("estimates are missing".to_owned());
+        };
+        let report =
+            |estimate: &Estimate, at_most: Option<f64>| event_report(estimate, at_most, &law);
+        let mut structures: Vec<StructureProbability> = Vec::new();
+        for (index, estimate) in told.iter().copied().zip(of_structures) {
+            let (obstacle, distance_m) = &self.near[index];
+            let seen = &self.structures[index];
+            structures.push(StructureProbability {
+                structure: obstacle.name.to_owned(),
+                tissue: obstacle.tissue.to_string(),
+                distance_m: *distance_m,
+                boundary_sd_m: seen.boundary_sd_m,
+                moves_with: match seen.body {
+                    Body::Wall => "wall",
+                    Body::Lung => "lung",
+                },
+                event: report(estimate, Some(bounds[index])),
+            });
+        }
+        structures.sort_by(|a, b| b.event.order().total_cmp(&a.event.order()));
+        let sum = |some: &[usize]| -> f64 {
+            let sum: f64 = some.iter().map(|index| bounds[*index]).sum();
+            sum.min(1.0)
+        };
+        let lesion = self.lesion.iter().zip(in_lesion);
+        let lesion = lesion.map(|((name, diameter_m), estimate)| LesionProbability {
+            lesion: name.clone(),
+            diameter_m: *diameter_m,
+            boundary_sd_m: self.structures[count + 3].boundary_sd_m,
+            event: report(estimate, None),
+        });
+        Ok(ProbabilityReport {
+            in_lesion: lesion.last(),
+            within_2_mm: report(within_2_mm, None),
+            any: (!told.is_empty()).then(|| report(any, Some(sum(&told)))),
+            structures,
+            margin_m: MARGIN_M,
+            others: self.others + left.len(),
+            others_at_most: sum(&[left, vec![count, count + 1]].concat()),
+            assumed: assumed(case.imperfections),
+        })
+    }
+}
+
+fn event_report(estimate: &Estimate, at_most: Option<f64>, law: &Law) -> EventProbability {
+    let mostly = estimate.influences.first().map(|first| match first.origin {
+        Origin::Part(index) => law.parts()[index].name.clone(),
+        Origin::Level => "level of the held breath".to_owned(),
+        Origin::Drift => "drift of the held breath".to_owned(),
+        Origin::FailedHolds => "failed holds".to_owned(),
+        Origin::Boundary => "boundary in the image".to_owned(),
+    });
+    EventProbability {
+        probability: match estimate.told {
+            Told::AtPlan => None,
+            _ => estimate.probability,
+        },
+        interval_95: [estimate.interval.low, estimate.interval.high],
+        at_most,
+        of_1000: estimate_label(estimate),
+        at_most_of_1000: at_most.map(bound_label),
+        mostly,
+        draws: estimate.draws,
+    }
+}
+
+/// Standard deviations of where boundaries are seen, m; 0 where no image is imperfect.
+struct Boundaries {
+    bone_m: f64,
+    soft_m: f64,
+}
+
+impl Boundaries {
+    fn of(imperfections: &Imperfections) -> Self {
+        let Some(voxel_m) = imperfections.imaging.map(|seen| seen.voxel_m) else {
+            return Self {
+                bone_m: 0.0,
+                soft_m: 0.0,
+            };
+        };
+        let slope = (BONE_SD_M[1] - BONE_SD_M[0]) / (SLICES_M[1] - SLICES_M[0]);
+        let bone_m = BONE_SD_M[0] + slope * (voxel_m.z - SLICES_M[0]);
+        // Half a voxel (assumed), one of the same volume.
+        let half_m = 0.5 * libm::cbrt(voxel_m.product());
+        Self {
+            bone_m: bone_m.max(0.0),
+            soft_m: half_m,
+        }
+    }
+
+    fn of_m(&self, tissue: Tissue) -> f64 {
+        if tissue == Tissue::Bone {
+            self.bone_m
+        } else {
+            self.soft_m
+        }
+    }
+}
+
+/// The surface of a part, phantom frame: corners of its triangles in turn.
+fn corners_of(phantom: &Phantom, name: &str) -> Vec<Point3<f64>> {
+    let parts = phantom.parts.iter().filter(|part| part.name == name);
+    let corners = parts.flat_map(|part| {
+        let place = part.solid.parent_from_shape;
+        let surface = part.solid.shape.surface(CHORD_M);
+        let triangles = surface.triangles.into_iter().flatten();
+        let vertices_m = surface.vertices_m;
+        triangles
+            .map(|vertex| place * vertices_m[vertex as usize])
+            .collect::<Vec<_>>()
+    });
+    corners.collect()
+}
+
+/// Bones and what is in no organ move with the chest wall; organs, and vessels most of whose parts are in one, as the target
+/// does (assumed).
+fn body_of(tissue: Tissue, parts: &[Vec<Point3<f64>>], phantom: &Phantom) -> Body {
+    let is_inner = match tissue {
+        Tissue::Bone => false,
+        Tissue::Organ => true,
+        _ => {
+            let obstacles = phantom.route_obstacles();
+            let is_in_organ = |corners: &&Vec<Point3<f64>>| {
+                let sum = corners
+                    .iter()
+                    .fold(Vector3::zeros(), |sum, corner| sum + corner.coords);
+                let middle = Point3::from(sum / corners.len().max(1) as f64);
+                let mut parts = obstacles.parts.iter().enumerate();
+                parts.any(|(index, part)| {
+                    part.tissue == Tissue::Organ && obstacles.solids.contains(index, &middle)
+                })
+            };
+            2 * parts.iter().filter(is_in_organ).count() > parts.len()
+        }
+    };
+    if is_inner { Body::Lung } else { Body::Wall }
+}
+
+/// What of the model was not measured.
+fn assumed(imperfections: &Imperfections) -> Vec<String> {
+    let there = Source::ALL
+        .into_iter()
+        .filter(|source| source.is_in(imperfections));
+    let assumed = there.filter(|source| source.is_measured_in(imperfections) != Some(true));
+    let mut names: Vec<String> = assumed.map(|source| source.name().to_owned()).collect();
+    names.push("boundaries in the image".to_owned());
+    names
+}
