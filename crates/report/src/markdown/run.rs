@@ -11,6 +11,7 @@ use super::ranking::ranking_markdown;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::judged::judged_blocks;
 use crate::table::needle::needle_blocks;
+use crate::table::probability::probability_blocks;
 use crate::table::shown::{Shown, shown_metrics};
 use crate::table::true_target::true_target_in_words;
 use crate::table::verdict::{counts, qualifies, qualifying, status};
@@ -73,6 +74,7 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
             writeln!(out, "{}\n", inline(&needle.summary))?;
             super::study::write_blocks(out, &needle_blocks(needle))?;
         }
+        super::study::write_blocks(out, &probability_blocks(goal))?;
         if let Some(words) = true_target_in_words(goal) {
             writeln!(out, "{words}\n")?;
         }

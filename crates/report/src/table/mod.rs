@@ -13,6 +13,7 @@ pub mod iso9283;
 pub(crate) mod judged;
 pub(crate) mod needle;
 pub mod overview;
+pub(crate) mod probability;
 pub(crate) mod ranking;
 mod referee;
 pub mod replay;

@@ -18,6 +18,7 @@ class RunPage {
   /** @type {HTMLElement} */ margins;
   /** @type {HTMLElement} */ budget;
   /** @type {HTMLElement} */ budgetSection;
+  /** @type {HTMLElement} */ likely;
   /** @type {HTMLElement} */ people;
   /** @type {HTMLElement} */ events;
   /** @type {HTMLElement} */ now;
@@ -180,6 +181,7 @@ class RunPage {
     this.table = NB.el('div');
     this.margins = NB.el('div');
     this.budget = NB.el('div');
+    this.likely = NB.el('div');
     this.people = NB.el('div');
     this.events = NB.el('div');
     this.now = NB.el('div', { class: 'now small', role: 'status', 'aria-live': 'off' });
@@ -194,6 +196,7 @@ class RunPage {
       },
     });
     const hasEvents = goals.some((goal) => goal.configurations.some((each) => each.events));
+    const hasProbability = goals.some((goal) => goal.configurations.some((each) => each.probability));
     this.budgetSection = NB.section('Tip error budget', true, this.budget);
     app.append(
       this.goalTable?.element || '',
@@ -231,6 +234,7 @@ class RunPage {
       ),
       NB.section('Comparison of configurations', true, this.table),
       this.budgetSection,
+      hasProbability ? NB.section('How likely: lesion and structures', true, this.likely) : '',
       hasEvents ? NB.section('Contact, emergency stop, retreat', true, this.events) : '',
       NB.section('Clearance of the planned motion', false, this.margins),
       NB.section('Free space and line of sight', false, this.people),
@@ -515,6 +519,7 @@ class RunPage {
     const budget = NB.sections.budget(goal, configuration, charts, name);
     this.budgetSection.hidden = !budget;
     NB.clear(this.budget, budget || []);
+    NB.clear(this.likely, NB.sections.probability(goal, configuration) || []);
     NB.clear(this.margins, NB.sections.margins(configuration));
     NB.clear(this.events, NB.sections.events(this.page, goal, configuration, charts) || []);
   }

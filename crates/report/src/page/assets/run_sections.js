@@ -273,6 +273,51 @@ NB.sections = /** @type {RunSections} */ (
       ];
     },
 
+    /** How likely the needle reaches the lesion and comes close to structures: all configurations, and this one. */
+    probability(goal, configuration) {
+      const with_ = /** @type {WithProbability[]} */ (goal.configurations.filter((c) => c.probability));
+      if (!with_.length) return null;
+      const dash = '\u2013';
+      /** @type {Column<WithProbability>[]} */
+      const columns = [
+        { title: 'Configuration', cell: (c) => c.label },
+        { title: 'Tip in the lesion', numeric: true, cell: (c) => c.probability.in_lesion?.of_1000 ?? dash },
+        { title: 'Tip within 2 mm of the target', numeric: true, cell: (c) => c.probability.within_2_mm.of_1000 },
+        { title: 'Close to a structure', numeric: true, cell: (c) => c.probability.any?.of_1000 ?? dash },
+        { title: 'Upper bound', numeric: true, cell: (c) => c.probability.any?.at_most_of_1000 ?? dash },
+        {
+          title: 'Most often',
+          cell: (c) => (c.probability.structures.length ? NB.words(c.probability.structures[0].structure) : dash),
+        },
+      ];
+      const own = configuration.probability;
+      /** @type {Column<StructureProbability>[]} */
+      const structures = [
+        { title: 'Structure', cell: (each) => NB.words(each.structure) },
+        { title: 'Tissue', cell: (each) => each.tissue },
+        { title: 'Distance', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.distance_m, 1) },
+        { title: 'Of 1000 needles', numeric: true, cell: (each) => each.of_1000 },
+        { title: 'Upper bound', numeric: true, cell: (each) => each.at_most_of_1000 ?? dash },
+        { title: 'Mostly', cell: (each) => (each.mostly ? NB.words(each.mostly) : dash) },
+      ];
+      const assumed = with_[0].probability.assumed.map((each) => NB.words(each)).join(', ');
+      return [
+        NB.el('p', {
+          class: 'soft small',
+          text:
+            'Of 1000 needles by this model, not of a patient: estimates with 95 % intervals, and upper bounds ' +
+            'without draws. ' +
+            `Close: needle surface nearer than ${NB.mm(with_[0].probability.margin_m, 0)} mm. Assumed: ${assumed}.`,
+        }),
+        NB.table('Of 1000 needles, by configuration', columns, with_, { class: 'small' }),
+        own?.structures.length
+          ? NB.table(`${configuration.label}: structures that the needle comes close to`, structures, own.structures, {
+              class: 'small',
+            })
+          : null,
+      ];
+    },
+
     people(goal) {
       const with_ = /** @type {WithRoom[]} */ (goal.configurations.filter((c) => c.room));
       const regions = [...new Set(with_.flatMap((c) => Object.keys(c.room.regions)))];

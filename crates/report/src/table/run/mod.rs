@@ -22,6 +22,7 @@ use super::engine_headings::{EngineHeading, engine_headings};
 use super::events::events_text;
 use super::judged::judged_blocks;
 use super::needle::needle_blocks;
+use super::probability::probability_blocks;
 use super::ranking::comparison_text;
 use super::shown::{Shown, shown_metrics};
 use super::true_target::true_target_in_words;
@@ -61,6 +62,7 @@ fn write_report(
             writeln!(out, "{}", needle.summary)?;
             out.push_str(&blocks_text(&needle_blocks(needle)));
         }
+        out.push_str(&blocks_text(&probability_blocks(goal)));
         let mut checks = columns(&headings, |heading| heading.engines);
         checks.retain(|column| column.metric.says_something(goal));
         if goal

@@ -18,6 +18,7 @@ use super::{
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::events::events_in_words;
 use crate::table::judged::judged_blocks;
+use crate::table::probability::probability_in_words;
 use crate::table::ranking::words;
 use crate::table::shown::shown_metrics;
 use crate::table::true_target::true_target_in_words;
@@ -155,6 +156,9 @@ fn write_goal(
     }
     if let Some(needle) = &goal.needle {
         writeln!(out, "{}", needle.summary)?;
+    }
+    if let Some(words) = probability_in_words(goal) {
+        writeln!(out, "{words}")?;
     }
     if let Some(words) = true_target_in_words(goal) {
         writeln!(out, "{words}")?;

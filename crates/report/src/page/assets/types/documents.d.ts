@@ -281,6 +281,31 @@ interface GoalReport {
   configurations: ConfigurationReport[];
 }
 
+/** How likely an event is: of 1000 needles, in words. */
+interface EventProbability {
+  probability: number | null;
+  of_1000: string;
+  at_most_of_1000?: string;
+  mostly?: string;
+}
+
+interface StructureProbability extends EventProbability {
+  structure: string;
+  tissue: string;
+  distance_m: number;
+}
+
+interface Probability {
+  in_lesion?: EventProbability & { lesion: string; diameter_m: number };
+  within_2_mm: EventProbability;
+  structures: StructureProbability[];
+  any: EventProbability | null;
+  margin_m: number;
+  assumed: string[];
+}
+
+type WithProbability = ConfigurationReport & { probability: Probability };
+
 interface ConfigurationReport {
   label: string;
   status: 'ok' | 'failed' | 'rejected';
@@ -298,6 +323,7 @@ interface ConfigurationReport {
   dominated_by: { label: string } | null;
   engine_difference: { peak_tip_m: number } | null;
   budget: Budget | null;
+  probability?: Probability;
   budget_failure: string | null;
   room: RoomReport | null;
   events?: Events;

@@ -372,6 +372,7 @@ interface RunSections {
   margins(c: ConfigurationReport): Child;
   budget(goal: GoalReport, configuration: ConfigurationReport, charts: ConfigurationCharts | null, name: string): Child;
   people(goal: GoalReport): Child;
+  probability(goal: GoalReport, configuration: ConfigurationReport): Child;
   criteria(page: RunDocument): HTMLElement;
   summary(criteria: CriterionResult[]): HTMLElement;
   requirements(report: Report): HTMLElement | null;
