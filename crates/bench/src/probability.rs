@@ -26,14 +26,14 @@ const MARGIN_M: f64 = 1e-3;
 /// The tip is to come so near to its point, m.
 const POINT_M: f64 = 2e-3;
 
-/// Structures that are farther from the planned needle count together, m.
+/// Structures that are farther from the planned needle, by this and a full breath, count together, m.
 const NEAR_M: f64 = 20e-3;
 
 /// Standard deviations of boundaries that they are taken to be nearer by: none is by more (6e-16).
 const FAR: f64 = 8.0;
 
 /// Most draws of an estimate.
-const DRAWS: u64 = 200_000;
+const DRAWS: u64 = 100_000;
 
 /// Solids are taken for triangles that are farther inside by no more, m.
 const CHORD_M: f64 = 1e-4;
@@ -62,6 +62,7 @@ pub(crate) fn probabilities(
         seed: resolved.scenario.seed,
         most: DRAWS,
         threads: 1,
+        moves: false,
     };
     let found = of_each(setup, plans, threads, |goal, case| {
         Some(goals[goal].as_ref()?.of(case, &draws))
@@ -136,7 +137,12 @@ impl<'a> Surroundings<'a> {
         let solids = &phantom.route_obstacles().solids;
         let entry = goal.entry_m?;
         let section = &resolved.scenario.planning.needle_route;
-        let seen = Boundaries::of(&resolved.expected.as_ref()?.imperfections);
+        let imperfections = &resolved.expected.as_ref()?.imperfections;
+        let seen = Boundaries::of(imperfections);
+        let breath_m = imperfections.breathing.map_or(0.0, |breathing| {
+            breathing.skin_m.norm().max(breathing.target_m.norm())
+        });
+        let near_m = NEAR_M + breath_m;
         let world_from_needle = world_from_needle(goal, &entry);
         let phantom_from_needle = placed.world_from_phantom.inverse() * world_from_needle;
         let needle_from_world = world_from_needle.inverse();
@@ -162,7 +168,7 @@ impl<'a> Surroundings<'a> {
             .collect();
         let (near, others): (Vec<_>, Vec<_>) = all
             .into_iter()
-            .partition(|(_, distance_m)| *distance_m < NEAR_M);
+            .partition(|(_, distance_m)| *distance_m < near_m);
         let mut structures = Vec::new();
         let mut places = Vec::new();
         let mut add = |name: &str, body, boundary_sd_m, covers, place| {
@@ -194,7 +200,7 @@ impl<'a> Surroundings<'a> {
                 place,
             );
         }
-        let distance_m = NEAR_M + needle.radius_m - FAR * seen.soft_m.max(seen.bone_m);
+        let distance_m = near_m + needle.radius_m - FAR * seen.soft_m.max(seen.bone_m);
         for body in [Body::Wall, Body::Lung] {
             let depth_m = needle.depth_m;
             let place = Place::Beyond {
@@ -205,9 +211,13 @@ impl<'a> Surroundings<'a> {
         }
         let target = Place::Ball(needle_from_world * goal.target_m, POINT_M);
         add("target", Body::Lung, 0.0, Vec::new(), target);
-        let lesions = phantom.lesions.iter();
-        let mut lesions = lesions.filter(|lesion| goal.lesion.as_ref() == Some(&lesion.name));
-        let lesion = lesions.next().map(|lesion| {
+        let place = placed.world_from_phantom.inverse() * goal.target_m;
+        let mut lesions = phantom.lesions.iter();
+        let lesion = lesions.find(|lesion| match &goal.lesion {
+            Some(name) => lesion.name == *name,
+            None => (place - lesion.center_m).norm() < 0.5 * lesion.diameter_m,
+        });
+        let lesion = lesion.map(|lesion| {
             let middle = needle_from_world * (placed.world_from_phantom * lesion.center_m);
             let place = Place::Ball(middle, 0.5 * lesion.diameter_m);
             add(&lesion.name, Body::Lung, seen.soft_m, Vec::new(), place);
@@ -403,8 +413,126 @@ fn assumed(imperfections: &Imperfections) -> Vec<String> {
     let there = Source::ALL
         .into_iter()
         .filter(|source| source.is_in(imperfections));
-    let assumed = there.filter(|source| source.is_measured_in(imperfections) != Some(true));
-    let mut names: Vec<String> = assumed.map(|source| source.name().to_owned()).collect();
+    let (measured, assumed): (Vec<Source>, Vec<Source>) =
+        there.partition(|source| source.is_measured_in(imperfections) == Some(true));
+    if measured.is_empty() {
+        return vec!["all sources".to_owned()];
+    }
+    let mut names: Vec<String> = assumed
+        .iter()
+        .map(|source| source.name().to_owned())
+        .collect();
     names.push("boundaries in the image".to_owned());
     names
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::Path;
+
+    use needlebench_clearance::ClearanceModel;
+    use needlebench_kinematics::trajectory::JointTrajectory;
+    use needlebench_numerics::random::SplitMix64;
+    use needlebench_planning::Planner;
+    use needlebench_scenario::{Overrides, load_scenario};
+    use needlebench_uncertainty::{Layout, Truth, servo_of, settle_after};
+
+    use super::*;
+
+    const DRAWS: usize = 20_000;
+
+    fn resolved(imperfections: &str) -> ResolvedScenario {
+        let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+        let text = fs::read_to_string(scenarios.join("table3.toml")).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("scenario.toml");
+        let text = text.replace("max_tip_rms_mm = 2.7", "");
+        fs::write(&file, format!("{text}\n[imperfections]\n{imperfections}")).unwrap();
+        load_scenario(&file, &Overrides::default()).unwrap()
+    }
+
+    /// Shares of arms and patients, settled and measured as in a run, whose straight needle comes closer to a structure, and
+    /// whose tip comes within 2 mm of the target.
+    fn shares(
+        resolved: &ResolvedScenario,
+        trajectory: &JointTrajectory,
+        structure: &str,
+    ) -> [f64; 2] {
+        let imperfections = resolved.imperfections.as_ref().unwrap();
+        let (cell, goal) = (&resolved.cell, &resolved.goals[0]);
+        let placed = resolved.phantom.as_ref().unwrap();
+        let place = &placed.world_from_phantom;
+        let servo = servo_of(resolved);
+        let entry = goal.entry_m.unwrap();
+        let planned = [entry, goal.target_m];
+        let depths_m = [goal.standoff_m.unwrap(), goal.insertion_length_m];
+        let layout = Layout::new(imperfections);
+        let obstacles = placed.phantom.route_obstacles();
+        let radius_m = 0.5 * cell.tool.needle.outer_diameter_m;
+        let mut hits = [0.0; 2];
+        for row in layout.hypercube(DRAWS, &mut SplitMix64::new(5)).iter() {
+            let truth = Truth::new(cell, Some(place), imperfections, &layout, row, 0).unwrap();
+            let settled = settle_after(&servo, &truth.dynamics(cell), &truth, trajectory).unwrap();
+            let needle = truth.needle_points(cell, &settled.position, depths_m);
+            let wanted = truth.wanted(goal, &planned);
+            // Where it is in the phantom as that was planned.
+            let [from, to] = [0, 1].map(|at| planned[at] + (needle[at] - wanted[at]));
+            let of = |index: usize| obstacles.parts[index].organ.as_deref() == Some(structure);
+            let nearest = obstacles
+                .solids
+                .nearest_to_segment(&from, &to, radius_m, place, of);
+            hits[0] += f64::from(u8::from(nearest.unwrap().1.distance_m < MARGIN_M));
+            hits[1] += f64::from(u8::from((to - goal.target_m).norm() < POINT_M));
+        }
+        hits.map(|count| count / DRAWS as f64)
+    }
+
+    /// Needles without breath, image and tissue: their place in the phantom is where arm and registration have it.
+    #[test]
+    fn counts_are_those_of_arms_and_patients_that_are_settled_and_measured() {
+        let resolved = resolved(
+            "[imperfections.calibration]\n[imperfections.elasticity]\n[imperfections.hand_eye]\n\
+             translation_mm = 2.5\n[imperfections.guide]\n",
+        );
+        let model = ClearanceModel::new(&resolved.cell);
+        let planner = Planner::new(&resolved, &model).unwrap();
+        let plan = planner.plan(&resolved.goals[0]);
+        let motion = plan
+            .configurations
+            .iter()
+            .find_map(|each| each.trajectory.as_ref());
+        let motion = motion.unwrap();
+        let servo = servo_of(&resolved);
+        let imperfections = &resolved.expected.as_ref().unwrap().imperfections;
+        let case = BudgetCase::of(&resolved, &resolved.goals[0], &servo, imperfections, motion);
+        let draws = Draws {
+            seed: 3,
+            most: DRAWS as u64,
+            threads: 1,
+            moves: false,
+        };
+        let around = Surroundings::new(&resolved, &resolved.goals[0]).unwrap();
+        let found = around.of(&case, &draws).unwrap();
+        let first = &found.structures[0];
+        let [close, within] = shares(&resolved, motion, &first.structure);
+        for (name, event, share) in [
+            (first.structure.as_str(), &first.event, close),
+            ("within 2 mm", &found.within_2_mm, within),
+        ] {
+            let [low, high] = event.interval_95;
+            let sd = (share * (1.0 - share) / DRAWS as f64).sqrt();
+            // Of first order, and play is normal: 5 %.
+            let slack = 3.0 * sd + 0.05 * share;
+            assert!(share > 0.01, "{name}: {share}");
+            assert!(
+                (low - slack..high + slack).contains(&share),
+                "{name}: {share} in {event:?}"
+            );
+            assert!(
+                event.at_most.is_none_or(|at_most| at_most > share - slack),
+                "{event:?}"
+            );
+        }
+    }
 }

@@ -87,11 +87,11 @@ impl ProbabilityReport {
         structures.filter(move |each| each.tissue == tissue)
     }
 
-    /// How likely the needle comes close to the structure of a tissue that it most likely does: the estimate, or the bound of
-    /// all that are not estimated.
+    /// How likely the needle comes close to the structure of a tissue that it most likely does: the estimate, or the most that
+    /// it can be where there is none; none where the planned path does already.
     pub(crate) fn value_of(&self, tissue: &str) -> Option<f64> {
         match self.of_tissue(tissue).next() {
-            Some(first) => first.event.probability,
+            Some(first) => (first.event.draws > 0).then(|| first.event.order()),
             None => Some(self.others_at_most),
         }
     }

@@ -91,6 +91,7 @@ fn estimates(c: &mut Criterion) {
         seed: 1,
         most,
         threads: 1,
+        moves: true,
     };
     for (name, breathes) in [("held", false), ("breath", true)] {
         let law = law(breathes);

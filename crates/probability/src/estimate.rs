@@ -29,8 +29,11 @@ const WITHIN: f64 = 0.1;
 /// Below this draws are moved to where the event happens.
 const RARE: f64 = 1e-3;
 
-/// With a smaller effective sample size a probability is below what can be told.
+/// With a smaller effective sample size moved draws tell nothing.
 const LEAST_SIZE: f64 = 200.0;
+
+/// With fewer hits plain draws instead tell no more than an upper end.
+const FEWEST_HITS: u64 = 20;
 
 /// Seed and effort of estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +44,8 @@ pub struct Draws {
     pub most: u64,
     /// Threads that may be used: they change nothing.
     pub threads: usize,
+    /// Events below 1e-3 are sampled by their importance; if not, all draws are plain ones.
+    pub moves: bool,
 }
 
 /// What an estimate says.
@@ -50,7 +55,7 @@ pub enum Told {
     Estimated,
     /// It happened in no draw: below the upper end of the interval, 3.7/n.
     NoHits,
-    /// Too few draws count: see the bound. The interval is that of plain draws.
+    /// Too few moved draws count, and too few plain ones hit: below the upper end of the interval of these.
     BelowWhatCanBeTold,
     /// The planned path does it already: nothing was drawn.
     AtPlan,
@@ -323,7 +328,7 @@ impl<'s, 'c, A: Anatomy> Sampler<'s, 'c, A> {
         let instead: Vec<usize> = left.iter().map(|(event, _)| *event).collect();
         for ((event, sums), (_, moved)) in self.plain(&instead, false)?.into_iter().zip(left) {
             let mut estimate = self.estimated(event, &sums, Method::PlainInstead);
-            if moved && (sums.hits as f64) < LEAST_SIZE {
+            if moved && sums.hits < FEWEST_HITS {
                 estimate.told = Told::BelowWhatCanBeTold;
                 estimate.probability = None;
                 estimate.influences.clear();
@@ -337,7 +342,7 @@ impl<'s, 'c, A: Anatomy> Sampler<'s, 'c, A> {
     fn is_rare(&self, event: usize, sums: &Sums) -> bool {
         let is_first = sums.draws == BLOCK.min(self.draws.most);
         let is_few = (sums.hits as f64) < RARE * sums.draws as f64;
-        is_first && is_few && self.events[event].obstacles().is_some()
+        self.draws.moves && is_first && is_few && self.events[event].obstacles().is_some()
     }
 
     /// Where the planned path does it already.

@@ -133,6 +133,7 @@ const DRAWS: Draws = Draws {
     seed: 11,
     most: 20_000,
     threads: 1,
+    moves: true,
 };
 
 #[test]

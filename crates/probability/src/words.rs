@@ -19,8 +19,7 @@ pub fn estimate_label(estimate: &Estimate) -> String {
             format!("{value} ({low} to {high})")
         }
         (Told::Estimated, Some(_)) => format!("less than {}", least()),
-        (Told::BelowWhatCanBeTold, _) => "below what can be told, see bound".to_owned(),
-        (Told::NoHits | Told::Estimated, _) => {
+        (Told::NoHits | Told::BelowWhatCanBeTold | Told::Estimated, _) => {
             format!("less than {}", count_above(interval.high))
         }
     }

@@ -3,6 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use needlebench_evaluation::probability::{
+    EventProbability, LesionProbability, ProbabilityReport, StructureProbability,
+};
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, GoalReport, MarginsReport,
     RejectionReport, Status, Verdict,
@@ -255,4 +258,98 @@ fn a_limit_on_true_targets_says_nothing_of_goals_without_one() {
     ] {
         assert_eq!(judged(NeedleMeasurement::default(), mode, engines), []);
     }
+}
+
+fn event(
+    probability: Option<f64>,
+    interval_95: [f64; 2],
+    at_most: Option<f64>,
+) -> EventProbability {
+    EventProbability {
+        probability,
+        interval_95,
+        at_most,
+        of_1000: "so many".to_owned(),
+        at_most_of_1000: at_most.map(|_| "at most so many".to_owned()),
+        mostly: None,
+        draws: 10_000,
+    }
+}
+
+/// What the criteria on probabilities make of a lesion and a vessel with these estimates.
+fn judged_probabilities(lesion: EventProbability, vessel: EventProbability) -> [Option<bool>; 2] {
+    let mut found = configuration(0, 0.05, 0.5);
+    found.probability = Some(ProbabilityReport {
+        in_lesion: Some(LesionProbability {
+            lesion: "a".to_owned(),
+            diameter_m: 0.01,
+            boundary_sd_m: 0.0,
+            event: lesion,
+        }),
+        within_2_mm: event(Some(0.5), [0.4, 0.6], None),
+        structures: vec![StructureProbability {
+            structure: "vessel".to_owned(),
+            tissue: "vessel".to_owned(),
+            distance_m: 0.004,
+            boundary_sd_m: 0.0,
+            moves_with: "wall",
+            event: vessel,
+        }],
+        any: None,
+        margin_m: 1e-3,
+        others: 3,
+        others_at_most: 1e-9,
+        assumed: Vec::new(),
+    });
+    let mut criteria = CriteriaSection {
+        min_lesion_probability: Some(0.9),
+        ..CriteriaSection::default()
+    };
+    criteria.max_structure_probability.vessel = Some(1e-3);
+    criteria.max_structure_probability.bone = Some(1e-3);
+    let judged = check_configuration("g", &found, &criteria, StudyMode::Dynamic, &[]);
+    let result = |key: &str| {
+        let open = judged.not_judged.iter().any(|each| each.criterion == key);
+        let result = judged.results.iter().find(|each| each.criterion == key);
+        assert!(open != result.is_some(), "{key}");
+        result.map(|each| each.pass)
+    };
+    // No bone is near: its bound says so.
+    assert_eq!(result("max_structure_probability.bone"), Some(true));
+    ["min_lesion_probability", "max_structure_probability.vessel"].map(result)
+}
+
+#[test]
+fn probabilities_are_judged_by_their_intervals_and_bounds() {
+    let lesion = |value, low, high| event(Some(value), [low, high], None);
+    let vessel = |value, low, high, most| event(Some(value), [low, high], Some(most));
+    let met = judged_probabilities(lesion(0.95, 0.94, 0.96), vessel(1e-4, 0.9e-4, 1.1e-4, 0.1));
+    assert_eq!(met, [Some(true), Some(true)]);
+    let missed = judged_probabilities(lesion(0.8, 0.79, 0.81), vessel(5e-3, 4e-3, 6e-3, 0.1));
+    assert_eq!(missed, [Some(false), Some(false)]);
+    // The limit is in the interval, on either side of the estimate: neither a pass nor a fail.
+    let open = judged_probabilities(
+        lesion(0.91, 0.89, 0.93),
+        vessel(1.1e-3, 0.9e-3, 1.3e-3, 0.1),
+    );
+    assert_eq!(open, [None, None]);
+    let open = judged_probabilities(
+        lesion(0.89, 0.88, 0.91),
+        vessel(0.9e-3, 0.8e-3, 1.1e-3, 0.1),
+    );
+    assert_eq!(open, [None, None]);
+    // The bound decides what the interval does not.
+    let bound = judged_probabilities(
+        lesion(0.95, 0.94, 0.96),
+        vessel(0.9e-3, 0.8e-3, 1.1e-3, 1e-3),
+    );
+    assert_eq!(bound, [Some(true), Some(true)]);
+    // No draw hit: all that is known is an upper end.
+    let none = event(None, [0.0, 3.7e-5], Some(0.1));
+    let found = judged_probabilities(lesion(0.95, 0.94, 0.96), none);
+    assert_eq!(found, [Some(true), Some(true)]);
+    // The planned path does it already, and nothing was drawn.
+    let at_plan = event(None, [0.0, 1.0], Some(1.0));
+    let found = judged_probabilities(lesion(0.95, 0.94, 0.96), at_plan);
+    assert_eq!(found, [Some(true), None]);
 }

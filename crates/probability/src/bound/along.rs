@@ -3,13 +3,16 @@
 use nalgebra::Vector3;
 use needlebench_numerics::normal;
 
-use super::mixture::{Cells, Normal, PHASES, fullnesses, normals};
+use super::mixture::{Cells, Normal, PHASES, binned, fullnesses, normals};
 use crate::breath::Body;
 use crate::case::{Anatomy, Case};
 
 /// Standard deviations, and more than what lies beyond.
 const FAR: f64 = 9.0;
 const BEYOND_FAR: f64 = 2e-19;
+
+/// Cells of the mean of what is normal.
+const POOLED: usize = 128;
 
 /// How far a needle is off along itself.
 #[expect(clippy::struct_field_names, reason = "all are in metres")]
@@ -91,19 +94,11 @@ pub(super) fn tail_of(
     distance_m: f64,
     boundary_sd_m: f64,
 ) -> f64 {
-    let of_state = |state: &Normal| -> f64 {
+    // Cells of the mean by variance: states that differ in their means alone, such as levels of a held breath, are one.
+    let mut pools: Vec<((u64, bool), Cells)> = Vec::new();
+    for state in states {
         let variance_m2 = axis.dot(&(state.covariance_m2 * axis)) + boundary_sd_m * boundary_sd_m;
-        let sd_m = variance_m2.max(0.0).sqrt();
-        let left_m = distance_m - axis.dot(&state.mean_m);
-        let above = |left_m: f64| {
-            if left_m > FAR * sd_m {
-                BEYOND_FAR
-            } else if sd_m > 0.0 {
-                normal::probability_below(-left_m / sd_m)
-            } else {
-                f64::from(u8::from(left_m <= 0.0))
-            }
-        };
+        let mean_m = axis.dot(&state.mean_m);
         let failed: Cells = state.failed_m.map_or_else(
             || vec![(1.0, 0.0)],
             |full| {
@@ -117,12 +112,35 @@ pub(super) fn tail_of(
         let pairs = failed.iter().flat_map(|(share, by_m)| {
             bends
                 .iter()
-                .map(move |(other, more_m)| (share * other, by_m + more_m))
+                .map(move |(other, more_m)| (state.weight * share * other, mean_m + by_m + more_m))
         });
-        state.weight
-            * pairs
-                .map(|(share, by_m)| share * above(left_m - by_m))
-                .sum::<f64>()
+        let key = (variance_m2.to_bits(), state.failed_m.is_some());
+        match pools.iter_mut().find(|(other, _)| *other == key) {
+            Some((_, cells)) => cells.extend(pairs),
+            None => pools.push((key, pairs.collect())),
+        }
+    }
+    let of_pool = |((variance_m2, _), cells): &((u64, bool), Cells)| -> f64 {
+        let sd_m = f64::from_bits(*variance_m2).max(0.0).sqrt();
+        let above = |left_m: f64| {
+            if left_m > FAR * sd_m {
+                BEYOND_FAR
+            } else if sd_m > 0.0 {
+                normal::probability_below(-left_m / sd_m)
+            } else {
+                f64::from(u8::from(left_m <= 0.0))
+            }
+        };
+        let sum = |cells: &Cells| -> f64 {
+            let each = cells.iter();
+            each.map(|(share, by_m)| share * above(distance_m - by_m))
+                .sum()
+        };
+        if cells.len() > POOLED {
+            sum(&binned(cells.iter().copied(), POOLED))
+        } else {
+            sum(cells)
+        }
     };
-    states.iter().map(of_state).sum()
+    pools.iter().map(of_pool).sum()
 }

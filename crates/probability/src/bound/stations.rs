@@ -200,13 +200,13 @@ struct Station {
     states: Vec<State>,
 }
 
+/// States of the breath with one covariance.
 struct State {
-    weight: f64,
     /// Largest standard deviation along a lateral axis, m.
     sd_m: f64,
     /// What a normal distribution with this one along every axis is off by: 1 if it has it already, else 2.
     factor: f64,
-    /// Distances of the mean from the plan, m.
+    /// How likely, and distances of the mean from the plan, m.
     means_m: Cells,
 }
 
@@ -216,19 +216,31 @@ impl Station {
             .bend()
             .map(|bend| turns(bend.direction()))
             .unwrap_or_default();
-        let states = normals(law, fraction, body);
-        let of = |state: &Normal| {
-            let (sd_m, factor) = widest(&state.covariance_m2);
-            State {
-                weight: state.weight,
-                sd_m,
-                factor,
-                means_m: means_m(law, fraction, state, &turns),
+        let mut states: Vec<State> = Vec::new();
+        for normal in &normals(law, fraction, body) {
+            let (sd_m, factor) = widest(&normal.covariance_m2);
+            let means_m = means_m(law, fraction, normal, &turns);
+            let weighted = means_m.into_iter();
+            let weighted = weighted.map(|(share, mean_m)| (normal.weight * share, mean_m));
+            // States that differ in their means alone, such as levels of a held breath, are one.
+            let same = |state: &&mut State| {
+                normal.failed_m.is_none() && (state.sd_m, state.factor) == (sd_m, factor)
+            };
+            match states.iter_mut().find(same) {
+                Some(state) => state.means_m.extend(weighted),
+                None => states.push(State {
+                    sd_m,
+                    factor,
+                    means_m: weighted.collect(),
+                }),
             }
-        };
-        Self {
-            states: states.iter().map(of).collect(),
         }
+        for state in &mut states {
+            if state.means_m.len() > FAILED.1 {
+                state.means_m = binned(state.means_m.iter().copied(), FAILED.1);
+            }
+        }
+        Self { states }
     }
 
     /// How likely it is off by more than a distance.
@@ -236,7 +248,7 @@ impl Station {
         let each = self.states.iter().map(|state| {
             let means = state.means_m.iter();
             let tails = means.map(|(share, mean_m)| share * state.tail(*mean_m, distance_m));
-            state.weight * tails.sum::<f64>()
+            tails.sum::<f64>()
         });
         each.sum()
     }

@@ -14,6 +14,7 @@ const DRAWS: Draws = Draws {
     seed: 21,
     most: 1_000_000,
     threads: 2,
+    moves: true,
 };
 
 /// Off by five standard errors at most, of which the interval has two on either side.

@@ -172,6 +172,7 @@ fn distances_must_be_numbers_in_metres_of_something() {
         seed: 1,
         most: 1000,
         threads: 1,
+        moves: true,
     };
     let closer = Event::Closer {
         structure: 0,
@@ -218,6 +219,7 @@ fn needles_structures_and_questions_have_sound_lengths() {
             seed: 1,
             most,
             threads: 1,
+            moves: true,
         };
         estimate(&case, &[event], &draws).unwrap_err()
     };

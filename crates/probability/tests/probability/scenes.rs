@@ -68,6 +68,7 @@ fn bounds_are_not_below_estimates_in_random_scenes() {
             seed: u64::from(scene),
             most: 100_000,
             threads: 2,
+            moves: true,
         };
         let found = estimate(&case, &[event], &draws).unwrap().remove(0);
         println!(

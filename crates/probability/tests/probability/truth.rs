@@ -12,6 +12,7 @@ fn estimated(cell: &Cell, seed: u64, most: u64) -> Estimate {
         seed,
         most,
         threads: 2,
+        moves: true,
     };
     estimate(&case, std::slice::from_ref(&cell.event), &draws)
         .unwrap()

@@ -38,8 +38,8 @@ fn nothing_below_a_millionth_is_a_number() {
     assert_eq!(found(Told::NoHits, None, 0.0, 3.7e-6), "less than 0.0037");
     assert_eq!(found(Told::NoHits, None, 0.0, 3.7e-4), "less than 0.37");
     assert_eq!(
-        found(Told::BelowWhatCanBeTold, None, 0.0, 3.7e-6),
-        "below what can be told, see bound"
+        found(Told::BelowWhatCanBeTold, None, 1e-6, 3.7e-5),
+        "less than 0.037"
     );
     assert_eq!(
         found(Told::AtPlan, None, 0.0, 1.0),

@@ -22,9 +22,11 @@ pub(crate) fn probability_in_words(goal: &GoalReport) -> Option<String> {
     }
     if let (Some(any), Some(first)) = (&all.any, all.structures.first()) {
         let bound = any.at_most_of_1000.as_ref();
-        let bound = bound.map_or_else(String::new, |bound| format!("; {bound}"));
+        let bound = bound.map_or_else(String::new, |bound| {
+            format!(" (by a bound without draws {bound})")
+        });
         parts.push(format!(
-            "{}{bound} come closer than {:.0} mm to a structure, most often to {}",
+            "{} come closer than {:.0} mm to a structure, most often to {}{bound}",
             any.of_1000,
             all.margin_m * 1e3,
             part_in_words(&first.structure)
