@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Every crate under `crates/`, the Python package, and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 39] = [
+const LAYERS: [(&str, &[&str]); 40] = [
     ("elementary", &[]),
     ("parallel", &[]),
     ("numerics", &[]),
@@ -73,6 +73,7 @@ const LAYERS: [(&str, &[&str]); 39] = [
     ("ros", &[]),
     ("breath", &["ros", "input", "numerics"]),
     ("urscript", &["kinematics"]),
+    ("controller", &["urscript", "kinematics"]),
     (
         "recorded",
         &["ros", "scenario", "cell", "input", "kinematics"],
@@ -301,13 +302,14 @@ const LAYERS: [(&str, &[&str]); 39] = [
 ];
 
 /// The same for tests alone: what their inputs are made of.
-const FOR_TESTS: [(&str, &[&str]); 9] = [
+const FOR_TESTS: [(&str, &[&str]); 10] = [
     ("geometry", &["numerics"]),
     ("scenario", &["numerics"]),
     ("clearance", &["input", "robot", "scenario"]),
     ("live", &["numerics"]),
     ("engine", &["input", "robot", "scenario"]),
     ("recorded", &["numerics"]),
+    ("controller", &["numerics"]),
     ("routing", &["numerics"]),
     ("iso9283", &["numerics"]),
     ("viewer", &["imaging"]),
