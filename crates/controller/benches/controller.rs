@@ -42,7 +42,7 @@ fn cell() -> (Controller, Measured, Pose) {
         wall_s: f64::NAN,
     };
     let pose = base_from_base_link() * arm.kinematics.base_link_from_flange(&start);
-    let mut controller = Controller::new(arm, start, true).unwrap();
+    let mut controller = Controller::new(&arm, start, true).unwrap();
     controller.cycle(&measured, &[request(Command::Play)]);
     (controller, measured, pose)
 }

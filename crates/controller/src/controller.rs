@@ -75,10 +75,10 @@ impl Controller {
     ///
     /// # Errors
     /// [`NotAnArm`].
-    pub fn new(arm: ArmData, start: Joints, is_running: bool) -> Result<Self, NotAnArm> {
+    pub fn new(arm: &ArmData, start: Joints, is_running: bool) -> Result<Self, NotAnArm> {
         arm.check(&start)?;
         Ok(Self {
-            arm,
+            arm: *arm,
             state: if is_running {
                 State::Stopped
             } else {

@@ -116,10 +116,14 @@ struct Cell {
 
 impl Cell {
     fn new(period_s: f64) -> Self {
-        let arm = arm(period_s);
+        Self::of(&arm(period_s))
+    }
+
+    fn of(arm: &ArmData) -> Self {
+        let period_s = arm.period_s;
         let controller = Controller::new(arm, start(), true).unwrap();
         Self {
-            arm,
+            arm: *arm,
             record: SetPoints::new(period_s, *controller.set_point()),
             controller,
             events: Vec::new(),

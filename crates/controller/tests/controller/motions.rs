@@ -2,6 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use needlebench_controller::{Blend, Command, Event, Goal};
+use needlebench_kinematics::trajectory::{DoubleS, ProfileLimits};
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose, rotation_angle_between};
 use needlebench_urscript::MotionKind;
 
@@ -257,7 +258,16 @@ fn blends_of_lines_stay_within_their_sphere_and_on_the_lines_outside() {
     assert!(entered > 50 && nearest > 1e-3, "{entered} {nearest}");
     let at_corner = cell.base_from_tcp(&blend.corner_rad).translation.vector;
     assert!((at_corner - corner).norm() < RESIDUAL_M);
-    // The program was told in time: the blend begins where the sphere does, not later.
+    // The program was told in time: the blend begins where the sphere does, not later. Both moves have one profile.
+    let profile = DoubleS::new(
+        (corner - from).norm(),
+        &ProfileLimits {
+            velocity: 0.25,
+            acceleration: 1.2,
+            jerk: 1.2 / RAMP_S,
+        },
+    );
+    assert!((profile.sample(blend.overlap_s).position - radius_m).abs() < 1e-8);
     let each_s = |way_m: f64| way_m / 0.25 + 0.25 / 1.2 + RAMP_S;
     let whole_s = each_s((corner - from).norm()) + each_s((end - corner).norm());
     assert!((cell.record.end_s() - 0.002 - (whole_s - blend.overlap_s)).abs() < 0.004);
@@ -485,4 +495,88 @@ fn set_points_are_one_course() {
     // Where a phase of jerk ends within a period: j T^2 / 8 of velocity over T, with 100 rad/s^3 and more of stops.
     assert!(worst[0] < 2e-4 && worst[1] < 0.2, "{worst:?}");
     assert!((0..JOINT_COUNT).all(|i| cell.position()[i].is_finite()));
+}
+
+/// Values that nobody means are refused by name, and change nothing.
+#[test]
+fn absurd_values_are_refused_by_name() {
+    let bad = f64::NAN;
+    let pose = Cell::new(0.002).base_from_tcp(&start());
+    let far = Pose::translation(1e3, 0.0, 0.0);
+    let line = |to: Pose, pace, blend_m| movel(to, pace, blend_m);
+    let servo = |gain: f64, lookahead_s: f64, time_s: f64| {
+        motion(MotionKind::Servo {
+            to: start(),
+            time_s,
+            lookahead_s,
+            gain,
+        })
+    };
+    let via = |via_m: Vector3<f64>| {
+        motion(MotionKind::Circle {
+            via_m,
+            to: shifted(&pose, Vector3::x() * 0.1, Vector3::zeros()),
+            pace: pace(1.0, 0.1),
+            blend_m: 0.0,
+        })
+    };
+    let tool = |linear: f64| {
+        goal(Goal::ToolSpeed {
+            speed: Vector6::new(linear, 0.0, 0.0, 0.0, 0.0, 0.0),
+            acceleration: 1.0,
+            time_s: None,
+        })
+    };
+    let on_the_line = pose.translation.vector + Vector3::x() * 0.05;
+    let cases = [
+        (
+            movej(moved(2, bad), pace(1.0, 1.0), 0.0),
+            "elbow is NaN rad",
+        ),
+        (movej(moved(5, 1e5), pace(1.0, 1.0), 0.0), "wrist_3 is 1000"),
+        (
+            movej(moved(2, 0.1), pace(bad, 1.0), 0.0),
+            "a is NaN rad/s^2",
+        ),
+        (movej(moved(2, 0.1), pace(1.0, 0.0), 0.0), "v is 0 rad/s"),
+        (movej(moved(2, 0.1), within(-1.0), 0.0), "t is -1 s"),
+        (movej(moved(2, 0.1), within(1e5), 0.0), "a, v or t"),
+        (movej(moved(2, 0.1), pace(1.0, 1.0), -0.1), "r is -0.1 m"),
+        (line(far, pace(1.0, 1.0), 0.0), "the end is no pose"),
+        (line(pose, pace(1.0, f64::INFINITY), 0.0), "v is inf m/s"),
+        (via(on_the_line), "begin, place between and end"),
+        (via(Vector3::repeat(bad)), "the place between is NaN m"),
+        (
+            servo(3000.0, 0.1, 0.002),
+            "gain is 3000 1/s^2, outside [100, 2000]",
+        ),
+        (
+            servo(300.0, 0.01, 0.002),
+            "lookahead_time is 0.01 s, outside [0.03, 0.2]",
+        ),
+        (servo(300.0, 0.1, bad), "t is NaN s"),
+        (
+            speedj(Joints::repeat(bad), 1.0, None),
+            "shoulder_pan is NaN",
+        ),
+        (speedj(Joints::zeros(), 0.0, None), "a is 0 rad/s^2"),
+        (tool(bad), "the speed of the tool is NaN m/s"),
+        (stopj(-1.0), "a is -1"),
+        (
+            motion(MotionKind::Stand { time_s: 1.0 }),
+            "a sleep is no motion",
+        ),
+    ];
+    for (what, expected) in cases {
+        let mut cell = Cell::playing(0.002);
+        cell.ask(what);
+        let [refusal] = cell.refusals()[..] else {
+            panic!("not refused: {expected}");
+        };
+        let text = refusal.to_string();
+        assert!(text.starts_with(expected), "{text}, not {expected}");
+        cell.wait(0.1);
+        assert_eq!(cell.position(), start());
+        assert!(cell.controller.is_steady());
+    }
 }

@@ -217,20 +217,20 @@ fn requests_take_effect_in_the_order_given() {
 #[test]
 fn data_of_no_arm_are_refused() {
     let good = arm(0.002);
-    assert!(Controller::new(good, start(), true).is_ok());
+    assert!(Controller::new(&good, start(), true).is_ok());
     for period_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(Controller::new(arm(period_s), start(), true).is_err());
+        assert!(Controller::new(&arm(period_s), start(), true).is_err());
     }
     let mut bad = good;
     bad.acceleration_rad_s2[4] = f64::NAN;
-    assert!(Controller::new(bad, start(), true).is_err());
+    assert!(Controller::new(&bad, start(), true).is_err());
     let mut bad = good;
     bad.servo_delay_s = -0.001;
-    assert!(Controller::new(bad, start(), true).is_err());
+    assert!(Controller::new(&bad, start(), true).is_err());
     for outside in [7.0, f64::NAN] {
         let mut posture = start();
         posture[2] = outside;
-        let error = Controller::new(good, posture, true).unwrap_err();
+        let error = Controller::new(&good, posture, true).unwrap_err();
         assert!(error.to_string().starts_with("elbow starts at"), "{error}");
     }
 }
@@ -239,7 +239,7 @@ fn data_of_no_arm_are_refused() {
 #[test]
 fn a_released_arm_is_held_where_it_is() {
     let arm = arm(0.002);
-    let mut controller = Controller::new(arm, start(), false).unwrap();
+    let mut controller = Controller::new(&arm, start(), false).unwrap();
     let measured = Measured {
         position: start() + Joints::from([0.0, 0.3, -0.01, 0.0, 0.0, f64::NAN]),
         wall_s: f64::NAN,
