@@ -9,6 +9,9 @@
 //! [`TABLE`] has what follows from every request in every state. What a UR controller does where no source says it is
 //! assumed, and marked so.
 //!
+//! Where [`State::is_braked`], the brakes hold the arm and not its drives: an emergency stop is the brakes' at once, and
+//! the set-point, which then stops by itself, is no reference. When they are released it moves to where the arm is.
+//!
 //! # Motions
 //! - `movej`, `movel`, `movep`, `movec`: from rest to rest by a ramped trapezoid, blends as the sum of the end of one
 //!   and the begin of the next. Begun while the arm moves otherwise, they wait until it has stopped.

@@ -109,7 +109,7 @@ pub enum Goal {
     ToolSpeed {
         /// m/s and rad/s.
         speed: Vector6<f64>,
-        /// Of the tool's point, m/s^2, or of the rotation where that alone changes, rad/s^2.
+        /// Of the tool's point, m/s^2, and of the rotation, rad/s^2; what changes more has it.
         acceleration: f64,
         /// As of [`Goal::JointSpeed`].
         time_s: Option<f64>,

@@ -134,7 +134,7 @@ mod tests {
             .unwrap();
             let even = (0..20_000).map(|k| record.end_s() * f64::from(k) / 20_000.0);
             // Set-points, and one bit to either side.
-            let on_them = times_s[1..2000]
+            let on_them = times_s[1..2100]
                 .iter()
                 .flat_map(|s| [s.next_down(), *s, s.next_up()]);
             for time_s in even.chain(on_them) {

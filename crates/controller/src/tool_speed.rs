@@ -8,9 +8,6 @@ use needlebench_kinematics::{Joints, Pose};
 use crate::course::{NoSolution, joint_rates, joints_near, stacked};
 use crate::ramp::Ramps;
 
-/// Changes of the translation below this lead no change of velocity that turns the tool, m/s.
-const NO_TRANSLATION_M_S: f64 = 1e-9;
-
 /// The tool's point changes its velocity along a line in the space of velocities.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ToolSpeed {
@@ -21,7 +18,8 @@ pub(crate) struct ToolSpeed {
 }
 
 impl ToolSpeed {
-    /// To a velocity of the tool's point (m/s) and of the tool's rotation (rad/s), in `base_link`.
+    /// To a velocity of the tool's point (m/s) and of the tool's rotation (rad/s), in `base_link`; with one acceleration
+    /// (m/s^2 and rad/s^2) for what changes more, as the script manual has it where `aRot` is not given.
     pub fn new(
         kinematics: &Kinematics,
         from: &JointState,
@@ -50,11 +48,7 @@ impl ToolSpeed {
         );
         let lead = |change: &Vector6<f64>| {
             let [linear, angular] = [0, 3].map(|row| change.fixed_rows::<3>(row).norm());
-            if linear > NO_TRANSLATION_M_S {
-                linear
-            } else {
-                angular
-            }
+            linear.max(angular)
         };
         Self {
             base_link_from_tcp,

@@ -102,13 +102,15 @@ fn servoj(to: Joints, time_s: f64) -> Command {
     })
 }
 
-/// A controller whose arm is where its set-points are.
+/// A controller with its record, and an arm.
 struct Cell {
     arm: ArmData,
     controller: Controller,
     record: SetPoints,
     events: Vec<Event>,
     wall_s: f64,
+    /// Where the arm is off its set-points.
+    off: Joints,
     arrival: u64,
     /// The last move.
     moving: Option<Origin>,
@@ -128,6 +130,7 @@ impl Cell {
             controller,
             events: Vec::new(),
             wall_s: f64::NAN,
+            off: Joints::zeros(),
             arrival: 0,
             moving: None,
         }
@@ -142,7 +145,7 @@ impl Cell {
 
     fn cycle(&mut self, requests: &[Request]) -> Cycle {
         let measured = Measured {
-            position: self.controller.set_point().position,
+            position: self.position() + self.off,
             wall_s: self.wall_s,
         };
         let cycle = self.controller.cycle(&measured, requests);

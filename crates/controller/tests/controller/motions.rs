@@ -416,9 +416,9 @@ fn speedl_moves_the_tools_point_as_told_and_stopl_keeps_its_line() {
         acceleration: 0.5,
         time_s: None,
     }));
-    let v = speed.fixed_rows::<3>(0).norm();
-    // Below the full acceleration: two phases of jerk.
-    let reach_s = 2.0 * (v * RAMP_S / 0.5_f64).sqrt();
+    let [v, turning] = [0, 3].map(|row| speed.fixed_rows::<3>(row).norm());
+    // The rotation leads: 0.22 rad/s and 0.5 rad/s^2.
+    let reach_s = turning / 0.5 + RAMP_S;
     let took_s = cell.finish();
     assert!(
         took_s >= reach_s - 1e-9 && took_s < reach_s + 0.002,

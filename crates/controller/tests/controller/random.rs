@@ -137,6 +137,7 @@ fn run(seed: u64, cycles: u32) -> Run {
         limit.upper_rad = start()[i] + reach_rad(seed);
     }
     let mut cell = Cell::of(&arm);
+    cell.off = joints(&mut random, &Joints::zeros(), 0.05);
     cell.ask(Command::Play);
     let mut from = Vec::new();
     for _ in 0..cycles {
