@@ -294,7 +294,7 @@ impl<'a> Surroundings<'a> {
             let sum: f64 = some.iter().map(|index| bounds[*index]).sum();
             sum.min(1.0)
         };
-        let lesion = self.lesion.iter().zip(in_lesion);
+        let lesion = self.lesion.as_ref().zip(in_lesion.first());
         let lesion = lesion.map(|((name, diameter_m), estimate)| LesionProbability {
             lesion: name.clone(),
             diameter_m: *diameter_m,
@@ -302,7 +302,7 @@ impl<'a> Surroundings<'a> {
             event: report(estimate, None),
         });
         Ok(ProbabilityReport {
-            in_lesion: lesion.last(),
+            in_lesion: lesion,
             within_2_mm: report(within_2_mm, None),
             any: (!told.is_empty()).then(|| report(any, Some(sum(&told)))),
             structures,
@@ -471,7 +471,7 @@ mod tests {
         let obstacles = placed.phantom.route_obstacles();
         let radius_m = 0.5 * cell.tool.needle.outer_diameter_m;
         let mut hits = [0.0; 2];
-        for row in layout.hypercube(DRAWS, &mut SplitMix64::new(5)).iter() {
+        for row in &layout.hypercube(DRAWS, &mut SplitMix64::new(5)) {
             let truth = Truth::new(cell, Some(place), imperfections, &layout, row, 0).unwrap();
             let settled = settle_after(&servo, &truth.dynamics(cell), &truth, trajectory).unwrap();
             let needle = truth.needle_points(cell, &settled.position, depths_m);

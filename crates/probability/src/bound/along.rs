@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use needlebench_numerics::normal;
 
-use super::mixture::{Cells, Normal, PHASES, binned, fullnesses, normals};
+use super::mixture::{Cells, Fullness, Normal, PHASES, binned, fullnesses, normals};
 use crate::breath::Body;
 use crate::case::{Anatomy, Case};
 
@@ -90,7 +90,7 @@ pub(super) fn tail(
 pub(super) fn tail_of(
     states: &[Normal],
     axis: &Vector3<f64>,
-    (bends, fullnesses): (&[(f64, f64)], &[(f64, [f64; 2])]),
+    (bends, fullnesses): (&[(f64, f64)], &[Fullness]),
     distance_m: f64,
     boundary_sd_m: f64,
 ) -> f64 {

@@ -13,6 +13,9 @@ use crate::law::Law;
 /// Cells with their probabilities and the largest value in each.
 pub(super) type Cells = Vec<(f64, f64)>;
 
+/// How likely the fullness of a breath is between two values, and both.
+pub(super) type Fullness = (f64, [f64; 2]);
+
 /// Angles from one to another, and how likely a turn is among them.
 pub(super) struct Turns {
     pub probability: f64,
@@ -140,7 +143,7 @@ pub(super) fn turns(direction: BendDirection) -> Vec<Turns> {
 }
 
 /// Values of fullness of a breath, sin^4(pi u) of a uniform phase, as cells: their probabilities and both ends.
-pub(super) fn fullnesses(count: u32) -> Vec<(f64, [f64; 2])> {
+pub(super) fn fullnesses(count: u32) -> Vec<Fullness> {
     let at = |cell: u32| {
         let sine = libm::sin(0.5 * PI * f64::from(cell) / f64::from(count));
         let square = sine * sine;
