@@ -1,9 +1,44 @@
 //! Calls of built-in functions with their values.
 
+use crate::lexer::shortened;
 use crate::place::{Place, ScriptError};
+use crate::tree::Argument;
 use crate::value::Value;
 
+/// Of each parameter the argument that it gets, if any.
+///
+/// # Errors
+/// An argument without a parameter, and two for one.
+pub(crate) fn arguments_of(
+    place: Place,
+    function: &str,
+    parameters: &[&str],
+    arguments: &[Argument],
+) -> Result<Vec<Option<usize>>, ScriptError> {
+    let mut of: Vec<Option<usize>> = vec![None; parameters.len()];
+    for (position, argument) in arguments.iter().enumerate() {
+        let index = match &argument.name {
+            None => (position < parameters.len()).then_some(position),
+            Some(name) => parameters.iter().position(|each| each == name),
+        };
+        let Some(index) = index else {
+            let message = match (&argument.name, parameters.len()) {
+                (Some(name), _) => format!("{function} has no parameter `{}`", shortened(name)),
+                (None, 1) => format!("{function} takes 1 argument at most"),
+                (None, most) => format!("{function} takes {most} arguments at most"),
+            };
+            return Err(ScriptError::new(argument.value.place, message));
+        };
+        if of[index].replace(position).is_some() {
+            let message = format!("{function}: `{}` is given twice", parameters[index]);
+            return Err(ScriptError::new(place, message));
+        }
+    }
+    Ok(of)
+}
+
 /// A call of a built-in function with its values.
+#[derive(Debug, Clone)]
 pub(crate) struct Call {
     pub place: Place,
     pub name: &'static str,

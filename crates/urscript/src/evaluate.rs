@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use crate::builtin::{Builtin, Does, builtin};
-use crate::call::Call;
+use crate::builtin::{Does, builtin};
+use crate::call::{Call, arguments_of};
+use crate::elements::{Step, element, replace, size as elements};
 use crate::lexer::shortened;
 use crate::load::{Entry, Load};
 use crate::machine::{Installation, Machine};
@@ -14,7 +15,7 @@ use crate::tree::{
     Argument, Expression, ExpressionKind, FunctionKind, Part, Program, Scope, Statement,
     StatementKind, Target,
 };
-use crate::value::{Value, checked_size, list};
+use crate::value::{Value, list};
 
 /// Most steps of a program: a loop that streams 100 000 joint positions takes fewer.
 pub const MOST_STEPS: u64 = 5_000_000;
@@ -52,25 +53,18 @@ pub fn evaluate(
     arm: &mut dyn Arm,
     installation: &Installation,
 ) -> Result<Outcome, ScriptError> {
-    let load = Load::new(program)?;
-    let (function, body) = match load.entry {
+    let load = Load::new(program, |name| format!("nothing has the name `{name}`"))?;
+    let (function, body) = match load.find_entry(program)? {
         Entry::Statements(statements) => (None, statements),
         Entry::Function(index) => {
             let function = load.functions[index].function;
-            if let Some((name, _)) = function.parameters.iter().find(|each| each.1.is_none()) {
-                let message = format!(
-                    "the program `{}` is given no `{}`",
-                    shortened(&function.name),
-                    shortened(name)
-                );
-                return Err(ScriptError::new(Place::START, message));
-            }
             (Some(index), function.body.as_slice())
         }
     };
+    let mut belief = Belief::default();
     let mut evaluator = Evaluator {
         load: &load,
-        machine: Machine::new(arm, installation),
+        machine: Machine::new(arm, installation, &mut belief),
         globals: BTreeMap::new(),
         frames: vec![Frame {
             function,
@@ -291,13 +285,13 @@ impl<'p> Evaluator<'p, '_> {
             }
             return Ok(());
         }
-        let mut indices: Vec<usize> = Vec::new();
+        let mut steps: Vec<Step> = Vec::new();
         for part in &target.parts {
             let Part::Element(parts) = part else {
                 return Err(self.machine.refused(place, "struct", "is not evaluated"));
             };
             for index in parts {
-                indices.push(self.index(index)?);
+                steps.push(Step::Index(self.index(index)?));
             }
         }
         let wrong = |message: String| ScriptError::new(place, message);
@@ -305,29 +299,13 @@ impl<'p> Evaluator<'p, '_> {
             let message = format!("`{}` has no value yet", shortened(&target.name));
             return Err(wrong(message));
         };
-        let copied = replace(variable, &indices, value).map_err(wrong)?;
+        let copied = replace(variable, &steps, value).map_err(wrong)?;
         self.step(place, copied)
     }
 
     fn index(&mut self, index: &'p Expression) -> Result<usize, ScriptError> {
-        match self.expression(index)? {
-            Value::Number(number) if number >= 0.0 && number.fract() == 0.0 && number < 1e9 => {
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "whole, and between 0 and 1e9"
-                )]
-                let index = number as usize;
-                Ok(index)
-            }
-            other => {
-                let message = format!(
-                    "{} is no index: they are whole numbers from 0",
-                    other.text()
-                );
-                Err(ScriptError::new(index.place, shortened(&message)))
-            }
-        }
+        let value = self.expression(index)?;
+        crate::elements::index(&value).map_err(|message| ScriptError::new(index.place, message))
     }
 
     /// A value that is not nothing.
@@ -455,7 +433,7 @@ impl<'p> Evaluator<'p, '_> {
             let message = format!("`{}` is not known here", shortened(name));
             return Err(ScriptError::new(place, message));
         };
-        let function = match builtin.does {
+        match builtin.does {
             Does::Refused(reason) => {
                 return Err(self.machine.refused(place, builtin.name, reason.in_words()));
             }
@@ -466,9 +444,13 @@ impl<'p> Evaluator<'p, '_> {
                 self.machine.note(place, note);
                 return Ok(Called::Value(Value::Nothing));
             }
-            Does::Evaluate(function) => function,
-        };
-        let values = self.bind(place, &builtin, arguments)?;
+            Does::Compute(_) | Does::Evaluate(_) => {}
+        }
+        let values = self.bind(place, builtin.name, builtin.parameters, arguments)?;
+        if let Some(missing) = builtin.missing(|index| values[index].is_some()) {
+            let message = format!("{}: `{missing}` is missing", builtin.name);
+            return Err(ScriptError::new(place, message));
+        }
         let lists = values.iter().flatten().map(elements);
         self.step(place, CALL_STEPS + lists.sum::<usize>())?;
         let call = Call {
@@ -477,7 +459,7 @@ impl<'p> Evaluator<'p, '_> {
             values,
             parameters: builtin.parameters,
         };
-        self.deeper(place, |inside| function(&mut inside.machine, &call))
+        self.deeper(place, |inside| builtin.evaluate(&mut inside.machine, &call))
             .map(Called::Value)
     }
 
@@ -485,49 +467,17 @@ impl<'p> Evaluator<'p, '_> {
     fn bind(
         &mut self,
         place: Place,
-        builtin: &Builtin,
-        arguments: &'p [Argument],
-    ) -> Result<Vec<Option<Value>>, ScriptError> {
-        let names: Vec<&str> = builtin.parameters.to_vec();
-        let values = self.bound(place, builtin.name, &names, arguments)?;
-        let missing = values
-            .iter()
-            .take(builtin.required)
-            .position(Option::is_none);
-        if let Some(missing) = missing {
-            let message = format!("{}: `{}` is missing", builtin.name, names[missing]);
-            return Err(ScriptError::new(place, message));
-        }
-        Ok(values)
-    }
-
-    fn bound(
-        &mut self,
-        place: Place,
         function: &str,
         names: &[&str],
         arguments: &'p [Argument],
     ) -> Result<Vec<Option<Value>>, ScriptError> {
-        let mut values: Vec<Option<Value>> = vec![None; names.len()];
-        for (position, argument) in arguments.iter().enumerate() {
-            let index = match &argument.name {
-                None => (position < names.len()).then_some(position),
-                Some(name) => names.iter().position(|each| each == name),
-            };
-            let Some(index) = index else {
-                let message = match &argument.name {
-                    Some(name) => format!("{function} has no parameter `{}`", shortened(name)),
-                    None => format!("{function} takes {} at most", count(names.len())),
-                };
-                return Err(ScriptError::new(argument.value.place, message));
-            };
-            if values[index].is_some() {
-                let message = format!("{function}: `{}` is given twice", names[index]);
-                return Err(ScriptError::new(place, message));
-            }
-            values[index] = Some(self.something(&argument.value)?);
+        let of = arguments_of(place, function, names, arguments)?;
+        let mut given = Vec::with_capacity(arguments.len());
+        for argument in arguments {
+            given.push(Some(self.something(&argument.value)?));
         }
-        Ok(values)
+        let value = |index: Option<usize>| index.and_then(|index| given[index].take());
+        Ok(of.into_iter().map(value).collect())
     }
 
     fn call_own(
@@ -555,7 +505,7 @@ impl<'p> Evaluator<'p, '_> {
             .iter()
             .map(|each| each.0.as_str())
             .collect();
-        let values = self.bound(place, &shortened(&function.name), &names, arguments)?;
+        let values = self.bind(place, &shortened(&function.name), &names, arguments)?;
         let mut locals: BTreeMap<&'p str, Value> = BTreeMap::new();
         for ((name, otherwise), value) in function.parameters.iter().zip(values) {
             let value = match (value, otherwise) {
@@ -586,73 +536,9 @@ impl<'p> Evaluator<'p, '_> {
     }
 }
 
-/// Elements of a list, those of lists in it included.
-fn elements(value: &Value) -> usize {
-    match value {
-        Value::List(all) => checked_size(all).unwrap_or(0),
-        _ => 0,
-    }
-}
-
 /// What came of a call.
 enum Called {
     Value(Value),
     /// The program ends.
     Halt,
-}
-
-fn count(number: usize) -> String {
-    match number {
-        1 => "1 argument".to_owned(),
-        _ => format!("{number} arguments"),
-    }
-}
-
-/// An element of a list or a pose.
-fn element(of: &Value, index: usize) -> Result<Value, String> {
-    let (found, length) = match of {
-        Value::List(all) => (all.get(index).cloned(), all.len()),
-        Value::Pose(all) => (all.get(index).copied().map(Value::Number), all.len()),
-        other => return Err(format!("{} has no elements", other.kind())),
-    };
-    found.ok_or_else(|| format!("there is no element {index} of {length}: the first one is 0"))
-}
-
-/// Puts a value in the place of an element; with the number of elements that were copied for it.
-fn replace(of: &mut Value, indices: &[usize], value: Value) -> Result<usize, String> {
-    let [first, rest @ ..] = indices else {
-        *of = value;
-        return Ok(0);
-    };
-    let outside =
-        |length: usize| format!("there is no element {first} of {length}: the first one is 0");
-    match of {
-        Value::List(all) => {
-            let length = all.len();
-            let is_list = matches!(value, Value::List(_));
-            let copied = if Rc::strong_count(all) > 1 { length } else { 0 };
-            let all = Rc::make_mut(all);
-            let found = all.get_mut(*first).ok_or_else(|| outside(length))?;
-            let inside = replace(found, rest, value)?;
-            // What grew is looked at as a whole.
-            let size = if is_list { checked_size(all)? } else { 0 };
-            Ok(copied + inside + size)
-        }
-        Value::Pose(all) => {
-            let Value::Number(number) = value else {
-                return Err(format!(
-                    "{} in a pose, where a number is needed",
-                    value.kind()
-                ));
-            };
-            if !rest.is_empty() {
-                return Err("a number has no elements".to_owned());
-            }
-            let all = Rc::make_mut(all);
-            let length = all.len();
-            *all.get_mut(*first).ok_or_else(|| outside(length))? = number;
-            Ok(0)
-        }
-        other => Err(format!("{} has no elements", other.kind())),
-    }
 }

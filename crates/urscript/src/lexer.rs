@@ -46,6 +46,9 @@ pub(crate) struct Token<'a> {
     pub place: Place,
 }
 
+/// Most words of a program, so that its tree takes some 50 MB at most: assumed, as a controller's is not known.
+const MOST_TOKENS: usize = 1 << 18;
+
 /// Operators and brackets, longer ones first.
 const SIGNS: [&str; 19] = [
     "==", "!=", "<=", ">=", "(", ")", "[", "]", ",", ":", "=", "<", ">", "+", "-", "*", "/", "%",
@@ -65,6 +68,10 @@ pub(crate) fn tokens(text: &str) -> Result<Vec<Token<'_>>, ScriptError> {
         lexer.skip_space();
         let token = lexer.token()?;
         let is_last = token.kind == Kind::End;
+        if found.len() >= MOST_TOKENS {
+            let message = format!("the program has more than {MOST_TOKENS} words");
+            return Err(ScriptError::new(token.place, message));
+        }
         found.push(token);
         if is_last {
             return Ok(found);

@@ -6,9 +6,12 @@
 
 mod builtin;
 mod call;
+mod elements;
 mod evaluate;
 mod functions;
+mod host;
 mod lexer;
+mod live;
 mod load;
 mod machine;
 mod motion;
@@ -20,6 +23,7 @@ mod value;
 mod walk;
 
 pub use evaluate::{MOST_STEPS, Outcome, evaluate};
+pub use host::{ArmState, Bank, Host, Message, Request, Signal};
 pub use machine::Installation;
 pub use motion::{Arm, Belief, Motion, MotionKind, Pace};
 pub use parser::{MOST_BYTES, MOST_LEVELS, parse};

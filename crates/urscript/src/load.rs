@@ -30,7 +30,6 @@ pub(crate) struct Load<'a> {
     pub functions: Vec<Loaded<'a>>,
     /// Functions by the one they are defined in and their name.
     by_name: BTreeMap<(Option<usize>, &'a str), usize>,
-    pub entry: Entry<'a>,
     /// Threads that count and do nothing else that the program could see.
     pub counting: BTreeSet<usize>,
 }
@@ -39,17 +38,15 @@ impl<'a> Load<'a> {
     /// Prepares a program.
     ///
     /// # Errors
-    /// A name that nothing has, and what does not say where the program begins.
-    pub fn new(program: &'a Program) -> Result<Self, ScriptError> {
+    /// A name that nothing has, as `unknown` says it.
+    pub fn new(program: &'a Program, unknown: fn(&str) -> String) -> Result<Self, ScriptError> {
         let mut load = Self {
             functions: Vec::new(),
             by_name: BTreeMap::new(),
-            entry: Entry::Statements(&program.statements),
             counting: BTreeSet::new(),
         };
         load.add(&program.statements, None)?;
-        load.check_names(program)?;
-        load.entry = load.find_entry(program)?;
+        load.check_names(program, unknown)?;
         load.counting = load.find_counting(program);
         Ok(load)
     }
@@ -101,7 +98,11 @@ impl<'a> Load<'a> {
     }
 
     /// The first name that nothing in the program has.
-    fn check_names(&self, program: &'a Program) -> Result<(), ScriptError> {
+    fn check_names(
+        &self,
+        program: &'a Program,
+        unknown: fn(&str) -> String,
+    ) -> Result<(), ScriptError> {
         let names = names(program);
         let own: BTreeSet<&str> = self.by_name.keys().map(|(_, name)| *name).collect();
         let mut wrong: Option<ScriptError> = None;
@@ -119,8 +120,7 @@ impl<'a> Load<'a> {
             if is_known || wrong.is_some() || builtin(name).is_some() && what == "function" {
                 return;
             }
-            let message = format!("nothing has the name `{}`", shortened(name));
-            let error = ScriptError::new(expression.place, message);
+            let error = ScriptError::new(expression.place, unknown(&shortened(name)));
             wrong = Some(match name.as_str() {
                 "true" | "false" => error.hint("truth values are True and False"),
                 _ if own.contains(name.as_str()) || builtin(name).is_some() => {
@@ -136,7 +136,10 @@ impl<'a> Load<'a> {
 
     /// A lone function is the program, and so is the one that a lone call after all functions names; where more stands
     /// at the first level, that is the program.
-    fn find_entry(&self, program: &'a Program) -> Result<Entry<'a>, ScriptError> {
+    ///
+    /// # Errors
+    /// What does not say where the program begins.
+    pub fn find_entry(&self, program: &'a Program) -> Result<Entry<'a>, ScriptError> {
         let mut functions: Vec<(Place, &Function)> = Vec::new();
         let mut others: Vec<&Statement> = Vec::new();
         for statement in &program.statements {
@@ -156,6 +159,11 @@ impl<'a> Load<'a> {
             }
             ([(_, lone)], []) => {
                 let found = index(&lone.name).expect("all functions are known by name");
+                if let Some((name, _)) = lone.parameters.iter().find(|each| each.1.is_none()) {
+                    let (program, name) = (shortened(&lone.name), shortened(name));
+                    let message = format!("the program `{program}` is given no `{name}`");
+                    return Err(ScriptError::new(Place::START, message));
+                }
                 Ok(Entry::Function(found))
             }
             ([_, (place, second), ..], []) => {
@@ -175,6 +183,7 @@ impl<'a> Load<'a> {
                     && arguments.is_empty()
                     && let Some(found) = index(name)
                     && self.functions[found].function.parameters.is_empty()
+                    && self.functions[found].function.kind != FunctionKind::Thread
                 {
                     return Ok(Entry::Function(found));
                 }

@@ -48,7 +48,9 @@ impl Note {
 pub(crate) struct Machine<'a> {
     pub arm: &'a mut dyn Arm,
     installation: &'a Installation,
-    pub belief: Belief,
+    pub belief: &'a mut Belief,
+    /// The arm is that of a controller which runs.
+    is_live: bool,
     /// The arm was given a motion.
     pub has_moved: bool,
     /// The last motion has a blend radius.
@@ -59,16 +61,28 @@ pub(crate) struct Machine<'a> {
 }
 
 impl<'a> Machine<'a> {
-    pub fn new(arm: &'a mut dyn Arm, installation: &'a Installation) -> Self {
+    pub fn new(
+        arm: &'a mut dyn Arm,
+        installation: &'a Installation,
+        belief: &'a mut Belief,
+    ) -> Self {
         Self {
             arm,
             installation,
-            belief: Belief::default(),
+            belief,
+            is_live: false,
             has_moved: false,
             is_blended: false,
             motions: 0,
             notes: Vec::new(),
         }
+    }
+
+    /// For a call on a controller.
+    #[must_use]
+    pub fn live(mut self) -> Self {
+        self.is_live = true;
+        self
     }
 
     /// Adds a note, or its line to the note of the same text.
@@ -87,8 +101,10 @@ impl<'a> Machine<'a> {
     }
 
     /// Why something that a program does is not evaluated.
-    #[expect(clippy::unused_self, reason = "said of this evaluation")]
     pub fn refused(&self, place: Place, name: &str, reason: &str) -> ScriptError {
+        if self.is_live {
+            return ScriptError::new(place, format!("`{name}` {reason}"));
+        }
         let message = format!("`{name}` {reason}: only fixed arguments are judged");
         ScriptError::new(place, message)
             .hint("run the program in the controller's simulator, and judge its RTDE log")

@@ -1,7 +1,9 @@
 //! What operators make of values.
 
+use nalgebra::DMatrix;
+
 use crate::tree::{Binary, Unary};
-use crate::value::{Value, list};
+use crate::value::{Value, from_matrix, list, matrix};
 
 /// The value of an operator before its operand.
 pub(crate) fn unary(operator: Unary, operand: Value) -> Result<Value, String> {
@@ -63,6 +65,9 @@ pub(crate) fn binary(operator: Binary, left: &Value, right: &Value) -> Result<Va
                 calculated(Binary::Multiply, number, *factor)
             })
         }
+        (Binary::Multiply, Value::List(_), Value::List(_)) => {
+            matrix_product(left, right)?.ok_or_else(wrong)
+        }
         (Binary::Divide, all, Value::Number(divisor)) => {
             each(&all.list_of_numbers().ok_or_else(wrong)?, |number| {
                 calculated(Binary::Divide, number, *divisor)
@@ -86,6 +91,33 @@ pub(crate) fn binary(operator: Binary, left: &Value, right: &Value) -> Result<Va
         }
         _ => Err(wrong()),
     }
+}
+
+/// A matrix times a matrix, or times a list.
+fn matrix_product(left: &Value, right: &Value) -> Result<Option<Value>, String> {
+    let Some(left) = matrix(left) else {
+        return Ok(None);
+    };
+    let column = right.list_of_numbers();
+    let right = match &column {
+        Some(numbers) => DMatrix::from_column_slice(numbers.len(), 1, numbers),
+        None => match matrix(right) {
+            Some(right) => right,
+            None => return Ok(None),
+        },
+    };
+    if left.ncols() != right.nrows() {
+        let (columns, rows) = (left.ncols(), right.nrows());
+        return Err(format!("`*` between {columns} columns and {rows} rows"));
+    }
+    let product = left * right;
+    if product.iter().any(|part| !part.is_finite()) {
+        return Err("the product is no finite matrix".to_owned());
+    }
+    if column.is_some() {
+        return Ok(Some(Value::numbers(product.as_slice())));
+    }
+    from_matrix(&product).map(Some)
 }
 
 fn each(

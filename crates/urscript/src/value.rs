@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 use needlebench_kinematics::{
     JOINT_COUNT, Joints, Pose, pose_from_rotation_vector, rotation_vector,
 };
@@ -31,6 +31,8 @@ pub enum Value {
     List(Rc<Vec<Value>>),
     /// A pose: position (m) and rotation vector (rad).
     Pose(Rc<[f64; 6]>),
+    /// A struct: its members in their order; assigned as a copy.
+    Struct(Rc<Vec<(Rc<str>, Value)>>),
 }
 
 impl Value {
@@ -54,26 +56,59 @@ impl Value {
             Self::Text(_) => "a string",
             Self::List(_) => "a list",
             Self::Pose(_) => "a pose",
+            Self::Struct(_) => "a struct",
         }
     }
 
-    /// As `to_str` and `textmsg` have it; whole numbers without a point.
+    /// As `to_str` and `textmsg` have it; whole numbers without a point. Cut where it is longer than any string may be.
     pub fn text(&self) -> String {
+        let mut text = String::new();
+        self.write(&mut text);
+        text
+    }
+
+    fn write(&self, text: &mut String) {
+        let numbers = |text: &mut String, numbers: &[f64]| {
+            for (index, number) in numbers.iter().enumerate() {
+                text.push_str(if index > 0 { ", " } else { "" });
+                text.push_str(&number.to_string());
+            }
+        };
         match self {
-            Self::Nothing => String::new(),
-            Self::Truth(true) => "True".to_owned(),
-            Self::Truth(false) => "False".to_owned(),
-            Self::Number(number) => number.to_string(),
-            Self::Text(text) => text.to_string(),
+            Self::Nothing => {}
+            Self::Truth(true) => text.push_str("True"),
+            Self::Truth(false) => text.push_str("False"),
+            Self::Number(number) => numbers(text, &[*number]),
+            Self::Text(part) => text.push_str(part),
             Self::List(all) => {
-                // Longer than any string may be.
-                let some = all.iter().take(MOST_CHARACTERS);
-                let texts: Vec<String> = some.map(Self::text).collect();
-                format!("[{}]", texts.join(", "))
+                text.push('[');
+                for (index, value) in all.iter().enumerate() {
+                    // Every element has a character at least.
+                    if text.len() > 4 * MOST_CHARACTERS {
+                        break;
+                    }
+                    text.push_str(if index > 0 { ", " } else { "" });
+                    value.write(text);
+                }
+                text.push(']');
             }
             Self::Pose(all) => {
-                let texts: Vec<String> = all.iter().map(f64::to_string).collect();
-                format!("p[{}]", texts.join(", "))
+                text.push_str("p[");
+                numbers(text, &**all);
+                text.push(']');
+            }
+            Self::Struct(all) => {
+                text.push_str("struct(");
+                for (index, (name, value)) in all.iter().enumerate() {
+                    if text.len() > 4 * MOST_CHARACTERS {
+                        break;
+                    }
+                    text.push_str(if index > 0 { ", " } else { "" });
+                    text.push_str(name);
+                    text.push('=');
+                    value.write(text);
+                }
+                text.push(')');
             }
         }
     }
@@ -124,11 +159,23 @@ pub(crate) fn checked_size(values: &[Value]) -> Result<usize, String> {
         let left = levels.checked_sub(1)?;
         let mut sum = values.len();
         for value in values {
-            if let Value::List(inside) = value {
-                sum += measure(inside, left)?;
-            }
+            sum += inside(value, left)?;
         }
         Some(sum)
+    }
+    fn inside(value: &Value, left: usize) -> Option<usize> {
+        match value {
+            Value::List(values) => measure(values, left),
+            Value::Struct(members) => {
+                let left = left.checked_sub(1)?;
+                let mut sum = members.len();
+                for (_, value) in members.iter() {
+                    sum += inside(value, left)?;
+                }
+                Some(sum)
+            }
+            _ => Some(0),
+        }
     }
     match measure(values, MOST_LIST_LEVELS) {
         None => Err(format!(
@@ -139,6 +186,67 @@ pub(crate) fn checked_size(values: &[Value]) -> Result<usize, String> {
         )),
         Some(size) => Ok(size),
     }
+}
+
+/// A whole number from 0 that indices and counts may be.
+pub(crate) fn whole(number: f64) -> Option<usize> {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "whole, and between 0 and 1e9"
+    )]
+    let found = number as usize;
+    (number >= 0.0 && number.fract() == 0.0 && number < 1e9).then_some(found)
+}
+
+/// A whole number of 32 bits.
+pub(crate) fn integer(number: f64) -> Result<i32, String> {
+    let is_whole =
+        number.fract() == 0.0 && number >= f64::from(i32::MIN) && number <= f64::from(i32::MAX);
+    #[expect(clippy::cast_possible_truncation, reason = "whole, and of 32 bits")]
+    let found = number as i32;
+    if is_whole {
+        Ok(found)
+    } else {
+        Err(format!("{number} is no whole number of 32 bits"))
+    }
+}
+
+/// A matrix, if a value is one.
+pub(crate) fn matrix(value: &Value) -> Option<DMatrix<f64>> {
+    let Value::List(rows) = value else {
+        return None;
+    };
+    let rows: Option<Vec<Vec<f64>>> = rows.iter().map(Value::list_of_numbers).collect();
+    let rows = rows?;
+    let columns = rows.first()?.len();
+    if columns == 0 || rows.iter().any(|row| row.len() != columns) {
+        return None;
+    }
+    let parts = rows.iter().flatten().copied();
+    Some(DMatrix::from_row_iterator(rows.len(), columns, parts))
+}
+
+/// A matrix as a list of its rows.
+///
+/// # Errors
+/// What is too large about it.
+pub(crate) fn from_matrix(matrix: &DMatrix<f64>) -> Result<Value, String> {
+    let rows = matrix.row_iter().map(|row| {
+        let parts: Vec<f64> = row.iter().copied().collect();
+        Value::numbers(&parts)
+    });
+    list(rows.collect()).map(|(value, _)| value)
+}
+
+/// A struct of members by name.
+///
+/// # Errors
+/// What is too large about it.
+pub(crate) fn structure(members: Vec<(Rc<str>, Value)>) -> Result<(Value, usize), String> {
+    let made = Value::Struct(Rc::new(members));
+    let size = checked_size(std::slice::from_ref(&made))?;
+    Ok((made, size))
 }
 
 /// A string, if it is not too long.

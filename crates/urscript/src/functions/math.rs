@@ -1,7 +1,6 @@
 //! Elementary functions.
 
 use crate::call::Call;
-use crate::machine::Machine;
 use crate::place::ScriptError;
 use crate::value::Value;
 
@@ -20,48 +19,48 @@ fn of_one(call: &Call, function: fn(f64) -> f64) -> Done {
     finite(call, function(number))
 }
 
-pub(crate) fn acos(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn acos(call: &Call) -> Done {
     of_one(call, libm::acos)
 }
 
-pub(crate) fn asin(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn asin(call: &Call) -> Done {
     of_one(call, libm::asin)
 }
 
-pub(crate) fn atan(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn atan(call: &Call) -> Done {
     of_one(call, libm::atan)
 }
 
 /// The manual's `atan2(x, y)` is the angle of x over y.
-pub(crate) fn atan2(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn atan2(call: &Call) -> Done {
     finite(call, libm::atan2(call.number(0)?, call.number(1)?))
 }
 
-pub(crate) fn ceil(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn ceil(call: &Call) -> Done {
     of_one(call, f64::ceil)
 }
 
-pub(crate) fn cos(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn cos(call: &Call) -> Done {
     of_one(call, libm::cos)
 }
 
-pub(crate) fn d2r(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn d2r(call: &Call) -> Done {
     of_one(call, f64::to_radians)
 }
 
-pub(crate) fn floor(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn floor(call: &Call) -> Done {
     of_one(call, f64::floor)
 }
 
 /// `log(b, f)`: of f to the base b.
-pub(crate) fn log(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn log(call: &Call) -> Done {
     finite(
         call,
         libm::log(call.number(1)?) / libm::log(call.number(0)?),
     )
 }
 
-pub(crate) fn norm(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn norm(call: &Call) -> Done {
     match call.value(0)? {
         Value::Number(number) => Ok(Value::Number(number.abs())),
         other => match other.list_of_numbers() {
@@ -71,7 +70,7 @@ pub(crate) fn norm(_: &mut Machine<'_>, call: &Call) -> Done {
     }
 }
 
-pub(crate) fn normalize(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn normalize(call: &Call) -> Done {
     let Some(all) = call.value(0)?.list_of_numbers() else {
         return Err(call.error("a list of numbers is needed"));
     };
@@ -87,22 +86,22 @@ fn length(all: &[f64]) -> f64 {
     all.iter().map(|each| each * each).sum::<f64>().sqrt()
 }
 
-pub(crate) fn pow(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn pow(call: &Call) -> Done {
     finite(call, libm::pow(call.number(0)?, call.number(1)?))
 }
 
-pub(crate) fn r2d(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn r2d(call: &Call) -> Done {
     of_one(call, f64::to_degrees)
 }
 
-pub(crate) fn sin(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn sin(call: &Call) -> Done {
     of_one(call, libm::sin)
 }
 
-pub(crate) fn sqrt(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn sqrt(call: &Call) -> Done {
     of_one(call, f64::sqrt)
 }
 
-pub(crate) fn tan(_: &mut Machine<'_>, call: &Call) -> Done {
+pub(crate) fn tan(call: &Call) -> Done {
     of_one(call, libm::tan)
 }
