@@ -1,11 +1,15 @@
 //! Programs in URScript, the language of the controllers of UR arms.
 //!
 //! [`parse`] makes of a text a tree in which everything has its line and column. [`evaluate`] does what a program does
-//! whose course constants decide, and gives its motions to an [`Arm`]. No files, no clock, and no arm but that.
+//! whose course constants decide, and gives its motions to an [`Arm`]. [`Program`] is a text that was checked as a
+//! whole, and [`Run`] does it cycle by cycle on a [`Host`], a controller with its clock. No files, no clock and no arm
+//! but those.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod builtin;
 mod call;
+mod code;
+mod compile;
 mod elements;
 mod evaluate;
 mod functions;
@@ -18,14 +22,17 @@ mod motion;
 mod operators;
 mod parser;
 mod place;
+mod run;
 pub mod tree;
 mod value;
 mod walk;
 
+pub use compile::Program;
 pub use evaluate::{MOST_STEPS, Outcome, evaluate};
 pub use host::{ArmState, Bank, Host, Message, Request, Signal};
 pub use machine::Installation;
 pub use motion::{Arm, Belief, Motion, MotionKind, Pace};
 pub use parser::{MOST_BYTES, MOST_LEVELS, parse};
 pub use place::{Place, ScriptError};
+pub use run::{End, LONGEST_BUSY_S, MOST_INSTRUCTIONS, MOST_THREADS, Progress, Run};
 pub use value::Value;

@@ -3,4 +3,6 @@
 mod evaluating;
 mod parsing;
 mod refusing;
+mod running;
 mod test_arm;
+mod test_host;
