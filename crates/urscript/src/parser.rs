@@ -487,6 +487,13 @@ impl<'text> Parser<'_, 'text> {
             Kind::Pose => {
                 self.advance();
                 let parts = self.expressions("]")?;
+                if parts.len() == 1 {
+                    // An element of a variable that is called `p`.
+                    let levels = 2.max(1 + deepest(&parts));
+                    let of = Box::new(checked(place, ExpressionKind::Name("p".to_owned()), 1)?);
+                    let indices = parts;
+                    return checked(place, ExpressionKind::Element { of, indices }, levels);
+                }
                 if parts.len() != 6 {
                     let message = format!("a pose has 6 numbers, this one {}", parts.len());
                     let error = ScriptError::new(place, message);

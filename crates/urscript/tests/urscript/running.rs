@@ -141,6 +141,11 @@ fn names_and_values_are_those_of_the_language() {
             "21",
         ),
         ("def p(): def f(): global y = 3 end f() textmsg(y) end", "3"),
+        // `p[` begins a pose, or an element of a variable of that name.
+        (
+            "def f(p): p[0] = p[0] * 2 return p end textmsg(f(p[1, 0, 0, 0, 0, 0]))",
+            "p[2, 0, 0, 0, 0, 0]",
+        ),
         // Lists, structs and poses are values.
         ("a = [1, 2] b = a b[0] = 7 textmsg(a[0], b[0])", "17"),
         (
