@@ -445,6 +445,7 @@ fn breathing_freely(imperfections: &Imperfections) -> Option<Imperfections> {
         .filter(|breathing| breathing.phase_spread.is_some())?;
     let free = |breathing: Breathing| Breathing {
         phase_spread: None,
+        drift_m: None,
         ..breathing
     };
     Some(Imperfections {

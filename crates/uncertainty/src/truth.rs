@@ -421,11 +421,19 @@ impl Truth {
         let (breath_m, breath_allowance_m) = imperfections.breathing.map_or_else(
             || ([Vector3::zeros(); 2], 0.0),
             |breathing| {
-                let share = breath(phase(&breathing, of(Source::Breathing)));
-                let moved = [breathing.skin_m, breathing.target_m]
-                    .map(|amplitude| shift.rotation * (place.rotation * amplitude) * share);
+                let values = of(Source::Breathing);
+                let share = breath(phase(&breathing, values));
+                let displaced = share_displaced(&breathing, values);
+                let in_world = |moved_m: Vector3<f64>| shift.rotation * (place.rotation * moved_m);
+                let mut moved_m = [breathing.skin_m, breathing.target_m]
+                    .map(|amplitude| in_world(amplitude) * displaced);
+                for (moved_m, drift_m) in moved_m.iter_mut().zip(breathing.drift_m.iter().flatten())
+                {
+                    *moved_m += in_world(*drift_m);
+                }
+                // In another phase the breath is at the same level.
                 let allowance_m = breathing.skin_m.norm() * share.max(1.0 - share);
-                (moved, allowance_m)
+                (moved_m, allowance_m)
             },
         );
         let unseen_m = imperfections.imaging.map_or_else(Vector3::zeros, |seen| {
@@ -639,6 +647,16 @@ pub(crate) fn joint_friction(
 /// Share of the breath's amplitude at a phase.
 pub(crate) fn breath(phase: f64) -> f64 {
     libm::sin(std::f64::consts::PI * phase).powi(4)
+}
+
+/// Share of the amplitudes that skin and target are displaced by, from the values of [`phase`].
+///
+/// Beside a level the phase has no spread, so that the normal value is the level's.
+pub(crate) fn share_displaced(breathing: &Breathing, values: &[f64]) -> f64 {
+    let shape = breath(phase(breathing, values));
+    breathing
+        .level_sd
+        .map_or(shape, |level_sd| level_sd * values[0] + shape)
 }
 
 /// Phase from a normal value, one that says whether the hold fails, and one for the phase if it does.

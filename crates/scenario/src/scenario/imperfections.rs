@@ -4,6 +4,7 @@
 //! effect (the same for every arm) and what is *uncertain* (one draw per arm or per patient). A run uses one draw, made
 //! from the scenario's seed; the error budget uses the distribution.
 
+mod breathing;
 mod measured;
 mod needle;
 
@@ -15,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::models::names_or_path;
 
+pub use breathing::BreathingBlock;
 pub use measured::CovarianceMm2;
 pub(crate) use needle::{BevelFace, IN_EXPECTED, IN_IMPERFECTIONS, SIDE_FORCE_N};
 pub use needle::{
@@ -507,51 +509,6 @@ impl Default for IndentationBlock {
     }
 }
 
-/// Breathing motion of the phantom.
-///
-/// Skin and lesion move by their amplitudes times `sin^4(pi phase)` (Lujan et al., Med. Phys. 26(5), 1999): zero at
-/// phase 0, the end of expiration, for which the plan is made, and maximal at 0.5.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct BreathingBlock {
-    /// Displacement of the skin from expiration to inspiration, phantom frame (left, posterior, superior), mm. Assumed:
-    /// quiet breathing.
-    #[schemars(inner(range(min = -60.0, max = 60.0)))]
-    pub skin_mm: [f64; 3],
-    /// Displacement of the target from expiration to inspiration, phantom frame (left, posterior, superior), mm.
-    /// Assumed: a lesion in the lower lung, quiet breathing.
-    #[schemars(inner(range(min = -60.0, max = 60.0)))]
-    pub target_mm: [f64; 3],
-    /// Breathing period, s.
-    #[schemars(range(min = 0.5, max = 60.0))]
-    pub period_s: f64,
-    /// Mean breathing phase at insertion; 0 is the end of expiration.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub phase: f64,
-    /// Standard deviation of the breathing phase at insertion. Not used with `free = true`, where the phase is uniform.
-    #[schemars(range(min = 0.0, max = 0.5))]
-    pub phase_spread: f64,
-    /// Share of breath-holds that fail; the needle is then inserted at any phase. Assumed.
-    #[schemars(range(min = 0.0, max = 1.0), extend("x-hint" = "it is a share: 5 % are 0.05"))]
-    pub hold_failure: f64,
-    /// Free breathing: the needle is inserted at any phase.
-    pub free: bool,
-}
-
-impl Default for BreathingBlock {
-    fn default() -> Self {
-        Self {
-            skin_mm: [0.0, -5.0, 0.0],
-            target_mm: [0.0, -2.0, -8.0],
-            period_s: 4.0,
-            phase: 0.0,
-            phase_spread: 0.08,
-            hold_failure: 0.05,
-            free: false,
-        }
-    }
-}
-
 fn arms(_: &mut SchemaGenerator) -> Schema {
     let shipped = Arm::shipped_calibrations().into_iter();
     let names = shipped.map(|(name, _)| name);
@@ -672,6 +629,9 @@ pub(super) fn check(toml: &TomlText<'_>, section: &ImperfectionsSection) -> Vec<
     }
     if let Some(block) = &section.needle {
         findings.extend(block.check(toml, IN_IMPERFECTIONS));
+    }
+    if let Some(block) = &section.breathing {
+        findings.extend(block.check(toml));
     }
     findings
 }

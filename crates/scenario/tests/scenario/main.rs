@@ -3,6 +3,7 @@
 mod arm_models;
 mod arms;
 mod assumed;
+mod breathing;
 mod calibration;
 mod family;
 mod foreign_chains;

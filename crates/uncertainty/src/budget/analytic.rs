@@ -41,7 +41,7 @@ pub(super) fn cross(
 ) -> Result<Matrix3<f64>, BudgetError> {
     let (_, joint_m2) = joint_of(case, imperfections, [skin, target])?;
     let mut sum = joint_m2.fixed_view::<3, 3>(0, 3).into_owned();
-    // Each breath has one phase for both.
+    // Each breath has one level and one phase for both.
     for ((skin_m, breathing), (target_m, _)) in skin.breaths.iter().zip(&target.breaths) {
         let (_, variance) = breath_moments(breathing);
         sum += skin_m * target_m.transpose() * variance;
@@ -76,6 +76,7 @@ pub(super) fn errors(
             mean_m: Vector3::zeros(),
             covariance_m2: Matrix3::zeros(),
             breaths: Vec::new(),
+            drift_m: None,
             discs: Vec::new(),
             bend: bends.map(|bends| bends.at(index, |across| roll_0 * across)),
         };
@@ -112,6 +113,9 @@ pub(super) fn errors(
             errors
                 .breaths
                 .push((-(place.rotation * amplitude), *breathing));
+            errors.drift_m = breathing
+                .drift_m
+                .map(|drift_m| -(place.rotation * drift_m[index]));
         }
         let loose = Source::Guide.is_in(imperfections);
         if let Some(clearance_m) = imperfections.guide_clearance_m.filter(|_| loose) {

@@ -2,7 +2,9 @@
 
 use needlebench_scenario::imperfections::Breathing;
 
-/// Mean and variance of `sin^4(pi phase)`: by its Fourier series under a normal or uniform phase.
+/// Mean and variance of `level + sin^4(pi phase)`: of the shape by its Fourier series under a normal or uniform phase.
+///
+/// Exact, as the level is independent of phase and failed holds.
 pub(super) fn breath_moments(breathing: &Breathing) -> (f64, f64) {
     /// `sin^4 x = 3/8 - 1/2 cos 2x + 1/8 cos 4x`.
     const FOURTH: [f64; 5] = [3.0 / 8.0, -0.5, 0.125, 0.0, 0.0];
@@ -39,7 +41,11 @@ pub(super) fn breath_moments(breathing: &Breathing) -> (f64, f64) {
         (1.0 - failed) * mean(series) + failed * series[0]
     };
     let first = any(&FOURTH);
-    (first, (any(&EIGHTH) - first * first).max(0.0))
+    let of_shape = (any(&EIGHTH) - first * first).max(0.0);
+    let variance = breathing
+        .level_sd
+        .map_or(of_shape, |level_sd| level_sd * level_sd + of_shape);
+    (first, variance)
 }
 
 #[cfg(test)]
@@ -61,6 +67,8 @@ mod tests {
                 phase: 0.1,
                 phase_spread,
                 hold_failure,
+                level_sd: None,
+                drift_m: None,
             };
             let (mut weight, mut first, mut second) = (0.0, 0.0, 0.0);
             let steps = 200_000;
@@ -96,6 +104,8 @@ mod tests {
             phase: 0.0,
             phase_spread: Some(0.0),
             hold_failure,
+            level_sd: None,
+            drift_m: None,
         };
         // Held exactly at the end of expiration there is no motion; a tenth fails.
         let (mean, variance) = breath_moments(&breathing(0.1));
@@ -103,5 +113,25 @@ mod tests {
         assert!((variance - (0.1 * 35.0 / 128.0 - 0.0375_f64.powi(2))).abs() < QUADRATURE);
         let (mean, _) = breath_moments(&breathing(0.0));
         assert!(mean.abs() < QUADRATURE);
+    }
+    /// A mixture by hand: with `a` held at the end of expiration and `b` at any phase, both about a level of sd 0.11, the
+    /// mean square is `a 0.11^2 + b (0.11^2 + 35/128)`.
+    #[test]
+    fn a_level_adds_its_variance_to_held_and_failed_breaths() {
+        let breathing = Breathing {
+            skin_m: Vector3::zeros(),
+            target_m: Vector3::zeros(),
+            period_s: 4.0,
+            phase: 0.0,
+            phase_spread: Some(0.0),
+            hold_failure: 0.05,
+            level_sd: Some(0.11),
+            drift_m: None,
+        };
+        let (mean, variance) = breath_moments(&breathing);
+        let square = 0.95 * 0.0121 + 0.05 * (0.0121 + 35.0 / 128.0);
+        assert!((mean - 0.01875).abs() < QUADRATURE, "{mean}");
+        let expected = square - 0.01875 * 0.01875;
+        assert!((variance - expected).abs() < QUADRATURE, "{variance}");
     }
 }

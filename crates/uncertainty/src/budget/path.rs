@@ -11,8 +11,9 @@ use crate::Source;
 use crate::bend::drawn_curves;
 use crate::truth::{breath, only};
 
-/// Levels that a held breath is taken at, each as likely: its phase is normal, and what it moves by is not.
-const LEVELS: u32 = 16;
+/// Phases that a held breath without a level is taken at, each as likely: its phase is normal, and what it moves by is
+/// not.
+const PHASES: u32 = 16;
 
 /// Why there is no law.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -29,7 +30,7 @@ pub enum PathError {
 /// point, y and z along x and y of the goal's guide exit at roll 0, m.
 ///
 /// Of first order in all that is linear, with play as its normal of the same covariance, one part for each source; the bend in
-/// tissue as its drawn curves, the breath as its states. Where the guide is aimed against the bend, the path is about its axis
+/// tissue as its drawn curves, the breath as its states, whose level and drift are exact. Where the guide is aimed against the bend, the path is about its axis
 /// all the same. Against draws that are settled and measured as in a run, quantiles of how far entry and tip are off, and of
 /// how much farther the one than the other, are within 5 % (tests).
 ///
@@ -101,27 +102,38 @@ fn in_budget(case: &BudgetCase<'_>, moved_m: &Vector3<f64>) -> Vector3<f64> {
     case.axes_from_world() * place
 }
 
-/// States of the breath: levels at which it is held, and holds that fail.
+/// States of the breath: held, and holds that fail.
 fn holds(case: &BudgetCase<'_>, breathing: &Breathing) -> Vec<Hold> {
-    let full_m =
-        [breathing.skin_m, breathing.target_m].map(|moved_m| axes() * in_budget(case, &moved_m));
+    let turned = |moved_m: &Vector3<f64>| axes() * in_budget(case, moved_m);
+    let full_m = [breathing.skin_m, breathing.target_m].map(|moved_m| turned(&moved_m));
+    let drift_m = breathing.drift_m.map_or_else(
+        || [Vector3::zeros(); 2],
+        |drift_m| drift_m.map(|each| turned(&each)),
+    );
+    let level_sd_m = full_m.map(|full_m| full_m * breathing.level_sd.unwrap_or(0.0));
+    let held = |weight: f64, fullness: f64| Hold {
+        level_sd_m,
+        drift_m: [0, 1].map(|body| full_m[body] * fullness + drift_m[body]),
+        ..Hold::still(weight)
+    };
     let failing = |weight: f64| Hold {
         failed_m: Some(full_m),
-        ..Hold::still(weight)
+        ..held(weight, 0.0)
     };
     let Some(spread) = breathing.phase_spread else {
         return vec![failing(1.0)];
     };
     let failure = breathing.hold_failure;
-    let levels = (0..LEVELS).map(|level| {
-        let share = (f64::from(level) + 0.5) / f64::from(LEVELS);
-        let fullness = breath(breathing.phase + spread * normal::quantile(share));
-        Hold {
-            drift_m: full_m.map(|moved_m| moved_m * fullness),
-            ..Hold::still((1.0 - failure) / f64::from(LEVELS))
-        }
-    });
-    let mut holds: Vec<Hold> = levels.collect();
+    let mut holds: Vec<Hold> = if breathing.level_sd.is_some() {
+        vec![held(1.0 - failure, breath(breathing.phase))]
+    } else {
+        let strata = (0..PHASES).map(|stratum| {
+            let share = (f64::from(stratum) + 0.5) / f64::from(PHASES);
+            let fullness = breath(breathing.phase + spread * normal::quantile(share));
+            held((1.0 - failure) / f64::from(PHASES), fullness)
+        });
+        strata.collect()
+    };
     if failure > 0.0 {
         holds.push(failing(failure));
     }

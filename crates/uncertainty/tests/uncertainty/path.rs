@@ -11,6 +11,10 @@ use crate::common::{ALL, POSTURES, imperfect, imperfect_in_tissue, motion_to, se
 
 const DRAWS: usize = 40_000;
 
+/// A breath held at a level that drifts, mostly.
+const LEVEL: &str = "[imperfections.breathing]\nsince_image_s = 90\nheld_s = 12\n\
+                     skin_drift_mm_s = [0, 0.05, 0]\n";
+
 /// How far each needle is off at skin and tip, budget's axes, m.
 fn full_draws_m(resolved: &ResolvedScenario) -> Vec<[Vector3<f64>; 2]> {
     let imperfections = resolved.imperfections.as_ref().expect("given");
@@ -65,6 +69,7 @@ fn covariances_of_entry_with_tip_are_those_of_draws() {
             "breath",
             imperfect("[imperfections.breathing]\nfree = true\n"),
         ),
+        ("level", imperfect(LEVEL)),
         ("play", imperfect("[imperfections.guide]\n")),
         ("unknown bevel", imperfect_in_tissue(tissue)),
         (
@@ -96,6 +101,52 @@ fn covariances_of_entry_with_tip_are_those_of_draws() {
     }
 }
 
+/// By hand: `E [(level + shape)^2] - E [shape]^2` along the amplitudes, and the mean with the drift.
+#[test]
+fn a_held_breath_has_its_level_and_drift() {
+    /// Rounding of micrometres.
+    const ROUNDING_M: f64 = 1e-12;
+    let resolved = imperfect(LEVEL);
+    let imperfections = resolved.imperfections.as_ref().expect("given");
+    let trajectory = motion_to(&resolved, POSTURES[0], 0.1);
+    let (servo, goal) = (servo(&resolved), &resolved.goals[0]);
+    let case = BudgetCase::of(&resolved, goal, &servo, imperfections, &trajectory);
+    let samples = Samples {
+        total: 20_000,
+        each_source: 0,
+    };
+    let whole = budget(&case, samples, 7).expect("a budget");
+    let (mean, square) = (0.05 * 3.0 / 8.0, 0.05 * 35.0 / 128.0);
+    let level_sd = (0.045_f64.powi(2) + (0.0017 * 90.0_f64).powi(2)).sqrt();
+    let variance = level_sd.powi(2) + square - mean * mean;
+    let drifts_m = [[0.0, 0.6e-3, 0.0], [0.0, 0.0, 1.8e-3]].map(Vector3::from);
+    let amplitudes_m = [[0.0, -5e-3, 0.0], [0.0, -2e-3, -8e-3]].map(Vector3::from);
+    let points = [&whole.total.at_skin, &whole.total.at_target];
+    for ((point, amplitude_m), drift_m) in points.into_iter().zip(amplitudes_m).zip(drifts_m) {
+        let off_m = point.analytic.bias().norm() - (amplitude_m * mean + drift_m).norm();
+        assert!(off_m.abs() < ROUNDING_M, "{off_m}");
+        let expected_m2 = variance * amplitude_m.norm_squared();
+        let off = point.analytic.covariance().trace() / expected_m2 - 1.0;
+        assert!(off.abs() < 1e-9, "{off}");
+        // Of 20 000 stratified draws of a breath that fails in a twentieth of all.
+        assert!(point.covariance_difference.expect("drawn") < 0.05);
+        assert!(point.bias_difference_m.expect("drawn") < 20e-6);
+        let [low_m, high_m] = point.drawn_radius_95_m.expect("drawn");
+        let radius_m = point.radius_95_m.expect("drawn");
+        assert!(
+            (low_m..=high_m).contains(&radius_m),
+            "{low_m} {radius_m} {high_m}"
+        );
+    }
+    // Who breathes freely holds nothing that drifts, at the same level.
+    let free = whole.breathing_freely.expect("it is held");
+    let at_mean_m = amplitudes_m[1] * (3.0 / 8.0);
+    assert!((free.bias().norm() - at_mean_m.norm()).abs() < ROUNDING_M);
+    let share = level_sd.powi(2) + 35.0 / 128.0 - 9.0 / 64.0;
+    let expected_m2 = share * amplitudes_m[1].norm_squared();
+    assert!((free.covariance().trace() / expected_m2 - 1.0).abs() < 1e-9);
+}
+
 #[test]
 fn entry_and_tip_go_together_as_in_runs() {
     let tissue = "[imperfections]\n[imperfections.calibration]\n[imperfections.registration]\n\
@@ -105,6 +156,14 @@ fn entry_and_tip_go_together_as_in_runs() {
         (
             "free",
             imperfect(&ALL.replace("hold_failure = 0", "free = true")),
+        ),
+        (
+            "level",
+            imperfect(&ALL.replace("hold_failure = 0", "since_image_s = 90\nheld_s = 12")),
+        ),
+        (
+            "free at a level",
+            imperfect(&ALL.replace("hold_failure = 0", "free = true\nsince_image_s = 90")),
         ),
         ("unknown bevel", imperfect_in_tissue(tissue)),
         (

@@ -2,6 +2,7 @@
 
 mod absorbed;
 mod arms;
+mod breathing;
 mod localised;
 mod needle;
 
@@ -11,6 +12,7 @@ use needlebench_kinematics::Joints;
 pub use absorbed::AbsorbedSag;
 pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
+pub use breathing::Breathing;
 pub use localised::{Localisation, Markers, TargetLocalisation};
 pub use needle::{
     Aim, Bends, Cantilever, Carried, NeedleBending, NeedleDraw, NeedlePath, TissueError,
@@ -173,23 +175,6 @@ pub struct PayloadSpread {
     pub com_spread_m: f64,
 }
 
-/// Breathing: displacement `amplitude * sin^4(pi phase)`, phantom frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Breathing {
-    /// Motion of the skin from expiration to inspiration, m.
-    pub skin_m: Vector3<f64>,
-    /// Motion of the target, m.
-    pub target_m: Vector3<f64>,
-    /// Time of one breath, s.
-    pub period_s: f64,
-    /// Mean phase of the insertion.
-    pub phase: f64,
-    /// Standard deviation of the phase; none if it is uniform.
-    pub phase_spread: Option<f64>,
-    /// Share of breaths whose phase is uniform all the same.
-    pub hold_failure: f64,
-}
-
 /// Samples of the Monte Carlo in a run unless the scenario says.
 const DEFAULT_BUDGET_SAMPLES: u32 = 2000;
 
@@ -222,14 +207,7 @@ pub(crate) fn resolve_imperfections(
     } = *given;
     let bore_clearance_m = tool.bore_m - tool.needle.outer_diameter_m;
     let joints = Joints::from_column_slice;
-    let breathing = section.breathing.as_ref().map(|block| Breathing {
-        skin_m: Vector3::from(block.skin_mm) * 1e-3,
-        target_m: Vector3::from(block.target_mm) * 1e-3,
-        period_s: block.period_s,
-        phase: block.phase,
-        phase_spread: (!block.free).then_some(block.phase_spread),
-        hold_failure: block.hold_failure,
-    });
+    let breathing = section.breathing.as_ref().map(Breathing::new);
     let registration = section.registration.as_ref().map(Markers::new);
     let skin_markers = section.skin_markers.as_ref().zip(registration.as_ref());
     let skin_markers = skin_markers
@@ -237,11 +215,7 @@ pub(crate) fn resolve_imperfections(
         .map(|((block, markers), breathing)| SkinMarkers {
             markers: markers.clone(),
             shift_m: block.shift_mm * 1e-3,
-            breathing: Breathing {
-                phase: 0.0,
-                phase_spread: breathing.phase_spread.map(|_| block.phase_spread),
-                ..breathing
-            },
+            breathing: breathing.of_markers(block.phase_spread),
         });
     let guide_clearance_m = section.guide.as_ref().map(|block| {
         block
