@@ -289,7 +289,16 @@ impl<'a> Surroundings<'a> {
                 event: report(estimate, Some(bounds[index])),
             });
         }
-        structures.sort_by(|a, b| b.event.order().total_cmp(&a.event.order()));
+        // Of those that no draw hits, the one with the largest bound first.
+        let key = |each: &StructureProbability| {
+            let event = &each.event;
+            let bound = event.at_most.unwrap_or(1.0);
+            (event.probability.unwrap_or(0.0), bound)
+        };
+        structures.sort_by(|a, b| {
+            let [(a, a_bound), (b, b_bound)] = [key(a), key(b)];
+            b.total_cmp(&a).then(b_bound.total_cmp(&a_bound))
+        });
         let sum = |some: &[usize]| -> f64 {
             let sum: f64 = some.iter().map(|index| bounds[*index]).sum();
             sum.min(1.0)

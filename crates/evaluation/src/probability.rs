@@ -12,7 +12,8 @@ pub struct ProbabilityReport {
     /// The tip is within 2 mm of the target.
     pub within_2_mm: EventProbability,
     /// The needle's surface comes closer to a structure than `margin_m`: those of which that is at least 1e-6 likely by the
-    /// upper bound, the likeliest first.
+    /// upper bound, the likeliest first,
+    /// then those that no draw hits by their bounds.
     pub structures: Vec<StructureProbability>,
     /// It comes closer to any of these structures.
     pub any: Option<EventProbability>,
@@ -91,7 +92,11 @@ impl ProbabilityReport {
     /// it can be where there is none; none where the planned path does already.
     pub(crate) fn value_of(&self, tissue: &str) -> Option<f64> {
         match self.of_tissue(tissue).next() {
-            Some(first) => (first.event.draws > 0).then(|| first.event.order()),
+            Some(first) => {
+                let event = &first.event;
+                let known = event.probability.unwrap_or_else(|| event.largest());
+                (event.draws > 0).then_some(known)
+            }
             None => Some(self.others_at_most),
         }
     }
@@ -152,11 +157,6 @@ impl EventProbability {
     pub fn largest(&self) -> f64 {
         let [_, high] = self.interval_95;
         self.at_most.map_or(high, |at_most| at_most.min(high))
-    }
-
-    /// What structures are listed by: the estimate, or the most that is known of it.
-    pub fn order(&self) -> f64 {
-        self.probability.unwrap_or_else(|| self.largest())
     }
 
     /// Of 1000 needles.

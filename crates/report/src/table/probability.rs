@@ -25,11 +25,13 @@ pub(crate) fn probability_in_words(goal: &GoalReport) -> Option<String> {
         let bound = bound.map_or_else(String::new, |bound| {
             format!(" (by a bound without draws {bound})")
         });
+        let most_often = any.probability.map_or_else(String::new, |_| {
+            format!(", most often to {}", part_in_words(&first.structure))
+        });
         parts.push(format!(
-            "{} come closer than {:.0} mm to a structure, most often to {}{bound}",
+            "{} come closer than {:.0} mm to a structure{most_often}{bound}",
             any.of_1000,
-            all.margin_m * 1e3,
-            part_in_words(&first.structure)
+            all.margin_m * 1e3
         ));
     }
     Some(format!(
@@ -70,7 +72,9 @@ pub(crate) fn probability_blocks(goal: &GoalReport) -> Vec<Block> {
             any.map_or_else(dash, |any| any.of_1000.clone()),
             any.and_then(|any| any.at_most_of_1000.clone())
                 .unwrap_or_else(dash),
-            first.map_or_else(dash, |first| part_in_words(&first.structure).into_owned()),
+            first
+                .filter(|first| first.event.probability.is_some())
+                .map_or_else(dash, |first| part_in_words(&first.structure).into_owned()),
         ])
     });
     let own = |what: String, event: &EventProbability, distance_m: Option<f64>| {

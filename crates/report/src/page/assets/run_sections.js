@@ -287,7 +287,10 @@ NB.sections = /** @type {RunSections} */ (
         { title: 'Upper bound', numeric: true, cell: (c) => c.probability.any?.at_most_of_1000 ?? dash },
         {
           title: 'Most often',
-          cell: (c) => (c.probability.structures.length ? NB.words(c.probability.structures[0].structure) : dash),
+          cell: (c) => {
+            const [first] = c.probability.structures;
+            return first?.probability ? NB.words(first.structure) : dash;
+          },
         },
       ];
       const own = configuration.probability;
