@@ -21,12 +21,15 @@ const LAYERS: [(&str, &[&str]); 40] = [
     ("geometry", &["kinematics"]),
     ("input", &[]),
     ("iso9283", &["input", "kinematics"]),
+    ("ros", &[]),
+    ("breath", &["ros", "input", "numerics"]),
     ("cell", &["geometry", "kinematics"]),
     ("robot", &["cell", "input", "geometry", "kinematics"]),
     ("phantom", &["insertion", "input", "geometry", "kinematics"]),
     (
         "scenario",
         &[
+            "breath",
             "iso9283",
             "insertion",
             "phantom",
@@ -70,8 +73,6 @@ const LAYERS: [(&str, &[&str]); 40] = [
         ],
     ),
     ("study", &["scenario", "input", "kinematics", "numerics"]),
-    ("ros", &[]),
-    ("breath", &["ros", "input", "numerics"]),
     ("urscript", &["kinematics"]),
     ("controller", &["urscript", "kinematics"]),
     (

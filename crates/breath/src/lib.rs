@@ -11,6 +11,7 @@ mod clock;
 mod drift;
 mod interval;
 mod level;
+#[cfg(not(target_arch = "wasm32"))]
 mod log;
 mod options;
 mod over_recordings;

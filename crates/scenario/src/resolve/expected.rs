@@ -74,6 +74,10 @@ impl RealThings<'_> {
                 spread: elastic.spread,
             })
         });
+        let breathing = section.breathing.as_ref();
+        let files = breathing.and_then(|block| block.recordings.as_deref());
+        let recorded = files.map(|files| self.library.recorded_breath(self.toml, files, self.base));
+        let recorded = recorded.transpose()?;
         let given = Given {
             toml: self.toml,
             needle_place,
@@ -81,9 +85,10 @@ impl RealThings<'_> {
             robot: self.robot,
             tool: self.tool,
             timestep_ms: self.timestep_ms,
+            arms: arms.as_deref(),
+            recorded: recorded.as_deref(),
         };
-        let resolved =
-            resolve_imperfections(&given, section, arms.as_deref(), elasticity.transpose()?)?;
+        let resolved = resolve_imperfections(&given, section, elasticity.transpose()?, notes)?;
         notes.extend(arms.iter().flat_map(|arms| arms.notes.iter().cloned()));
         Ok(resolved)
     }

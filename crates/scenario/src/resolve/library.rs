@@ -13,7 +13,7 @@ use needlebench_robot::{LoadedRobot, MissingInertia, StatedShape, ToolOverrides}
 
 use super::cache::Cache;
 use super::fixtures::fixture_finding;
-use super::imperfections::{AbsorbedSag, GearTwist, RealArms, resolve_calibration};
+use super::imperfections::{AbsorbedSag, GearTwist, RealArms, RecordedBreath, resolve_calibration};
 use super::obstacles::{UnplacedShape, unplaced_shape};
 use super::overrides::Overrides;
 use super::phantom::{UnplacedPhantom, scenario_phantom};
@@ -57,6 +57,7 @@ pub(crate) struct ModelLibrary {
     obstacles: Cache<ObstacleShape, UnplacedShape>,
     real_arms: Cache<(CalibrationBlock, Option<ModelSource>), RealArms>,
     absorbed: Cache<(Dynamics, GearTwist), AbsorbedSag>,
+    recorded_breath: Cache<Vec<String>, RecordedBreath>,
 }
 
 /// What decides a robot but its place.
@@ -229,6 +230,19 @@ impl ModelLibrary {
                 let arms = resolve_calibration(toml, block, robot, base)?;
                 Ok((key.clone(), arms))
             },
+        )
+    }
+
+    /// What recordings of breath say.
+    pub(crate) fn recorded_breath(
+        &self,
+        toml: &TomlText<'_>,
+        files: &[String],
+        base: &Path,
+    ) -> Result<Arc<RecordedBreath>, Finding> {
+        self.recorded_breath.get(
+            |known| known == files,
+            || Ok((files.to_vec(), RecordedBreath::read(toml, files, base)?)),
         )
     }
 

@@ -68,6 +68,7 @@ mod tests {
                 phase_spread,
                 hold_failure,
                 level_sd: None,
+                is_level_measured: false,
                 drift_m: None,
             };
             let (mut weight, mut first, mut second) = (0.0, 0.0, 0.0);
@@ -105,6 +106,7 @@ mod tests {
             phase_spread: Some(0.0),
             hold_failure,
             level_sd: None,
+            is_level_measured: false,
             drift_m: None,
         };
         // Held exactly at the end of expiration there is no motion; a tenth fails.
@@ -126,6 +128,7 @@ mod tests {
             phase_spread: Some(0.0),
             hold_failure: 0.05,
             level_sd: Some(0.11),
+            is_level_measured: false,
             drift_m: None,
         };
         let (mean, variance) = breath_moments(&breathing);

@@ -318,6 +318,7 @@ mod tests {
             phase_spread,
             hold_failure,
             level_sd: None,
+            is_level_measured: false,
             drift_m: None,
         }
     }

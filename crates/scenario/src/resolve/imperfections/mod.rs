@@ -13,6 +13,7 @@ pub use absorbed::AbsorbedSag;
 pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
 pub use breathing::Breathing;
+pub(crate) use breathing::RecordedBreath;
 pub use localised::{Localisation, Markers, TargetLocalisation};
 pub use needle::{
     Aim, Bends, Cantilever, Carried, NeedleBending, NeedleDraw, NeedlePath, TissueError,
@@ -188,14 +189,18 @@ pub(crate) struct Given<'a> {
     pub robot: &'a LoadedRobot,
     pub tool: &'a Tool,
     pub timestep_ms: f64,
+    /// Real arms of the calibration block.
+    pub arms: Option<&'a RealArms>,
+    /// Recordings of the breathing block.
+    pub recorded: Option<&'a RecordedBreath>,
 }
 
-/// Resolves the section. `arms` are the real arms of its calibration block.
+/// Resolves the section.
 pub(crate) fn resolve_imperfections(
     given: &Given<'_>,
     section: &ImperfectionsSection,
-    arms: Option<&RealArms>,
     elasticity: Option<Elasticity>,
+    notes: &mut Vec<String>,
 ) -> Result<Imperfections, Finding> {
     let Given {
         toml,
@@ -204,10 +209,13 @@ pub(crate) fn resolve_imperfections(
         robot,
         tool,
         timestep_ms,
+        arms,
+        recorded,
     } = *given;
     let bore_clearance_m = tool.bore_m - tool.needle.outer_diameter_m;
     let joints = Joints::from_column_slice;
-    let breathing = section.breathing.as_ref().map(Breathing::new);
+    let breathing = section.breathing.as_ref();
+    let breathing = breathing.map(|block| Breathing::new(toml, block, recorded, notes));
     let registration = section.registration.as_ref().map(Markers::new);
     let skin_markers = section.skin_markers.as_ref().zip(registration.as_ref());
     let skin_markers = skin_markers
@@ -223,6 +231,11 @@ pub(crate) fn resolve_imperfections(
             .map_or(bore_clearance_m, |mm| mm * 1e-3)
     });
     let mut sources = arms.map(|arms| arms.sources.clone()).unwrap_or_default();
+    sources.extend(
+        recorded
+            .iter()
+            .flat_map(|recorded| recorded.sources.iter().cloned()),
+    );
     let needle = section.needle.as_ref().map(|block| {
         let play_m = 0.5 * guide_clearance_m.unwrap_or(0.0);
         needle_bending(toml, needle_place, block, tool, play_m, base, &mut sources)

@@ -52,10 +52,16 @@ pub struct BreathingBlock {
     /// 1508.00749).
     #[schemars(range(min = 0.0, max = 1.0), extend("x-hint" = "it is a share: 5 % are 0.05"))]
     pub level_at_once: Option<f64>,
-    /// Growth of the level's standard deviation with the time since the image, as a share of the amplitude, 1/s. Default
-    /// with `since_image_s`: 0.0017, from the same recordings: 0.1 of the amplitude in a minute.
+    /// Growth of the level's standard deviation with the time since the image, as a share of the amplitude, 1/s.
+    /// Default with `since_image_s`: 0.0017, from the same recordings: 0.1 of the amplitude in a minute.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub level_per_s: Option<f64>,
+    /// Recordings of breath, as `needlebench breath` reads them: paths relative to this file, one marker on the skin of
+    /// each patient, tables with the units of their columns in the header. Five or more give the level's law, and
+    /// `period_s` (median) and the length of `skin_mm` where these are not given; all but the period are 90th
+    /// percentiles over recordings. Fewer are not enough to tell: defaults stay, with a note.
+    #[schemars(length(min = 1), extend("x-hint" = "five or more give a level"), inner(length(min = 1)))]
+    pub recordings: Option<Vec<String>>,
     /// Time that the breath has been held at insertion, s. Default: none, and no drift.
     #[schemars(range(min = 0.0, max = 120.0))]
     pub held_s: Option<f64>,
@@ -64,7 +70,8 @@ pub struct BreathingBlock {
     #[schemars(inner(range(min = -2.0, max = 2.0)))]
     pub skin_drift_mm_s: Option<[f64; 3]>,
     /// Drift of the target while the breath is held, phantom frame (left, posterior, superior), mm/s. Default with
-    /// `held_s`: 0.15 superior, as the diaphragm rises (PubMed 9807578). Assumed: a lesion in the lower lung; less above.
+    /// `held_s`: 0.15 superior, as the diaphragm rises (PubMed 9807578). Assumed: a lesion in the lower lung, less
+    /// above.
     #[schemars(inner(range(min = -2.0, max = 2.0)))]
     pub target_drift_mm_s: Option<[f64; 3]>,
 }
@@ -82,6 +89,7 @@ impl Default for BreathingBlock {
             since_image_s: None,
             level_at_once: None,
             level_per_s: None,
+            recordings: None,
             held_s: None,
             skin_drift_mm_s: None,
             target_drift_mm_s: None,
@@ -110,13 +118,21 @@ impl BreathingBlock {
             findings.push(toml.finding(&key, message).hint(hint));
         };
         if self.since_image_s.is_none() {
-            for key in given(of_level) {
+            let recordings = self.recordings.iter().map(|_| "recordings");
+            for key in given(of_level).chain(recordings) {
                 let message = format!("`{key}` has no meaning without `since_image_s`");
                 find(
                     key,
                     message,
                     "`since_image_s = 60`: the time from the image to the insertion, s",
                 );
+            }
+        }
+        if self.recordings.is_some() {
+            for key in given(of_level) {
+                let message = format!("`{key}` contradicts `recordings`");
+                let hint = "the level is that of the recordings: leave one of them out";
+                find(key, message, hint);
             }
         }
         if self.held_s.is_none() {
@@ -137,7 +153,9 @@ impl BreathingBlock {
                 "a patient who breathes freely holds no breath: leave one of them out",
             );
         }
-        if self.since_image_s.is_some() && !self.free && self.gives_phase_spread(toml) {
+        let is_usual = self.phase_spread == Self::default().phase_spread;
+        let gives_phase_spread = is_given(toml, "phase_spread", is_usual);
+        if self.since_image_s.is_some() && !self.free && gives_phase_spread {
             let message = format!(
                 "`phase_spread = {}` contradicts `since_image_s`",
                 self.phase_spread
@@ -148,9 +166,18 @@ impl BreathingBlock {
         findings
     }
 
-    /// What a study changes has no text: there a value counts as given where it is not the default.
-    fn gives_phase_spread(&self, toml: &TomlText<'_>) -> bool {
-        self.phase_spread != Self::default().phase_spread
-            || toml.span_of(&format!("{PLACE}.phase_spread")).is_some()
+    /// Whether the displacement of the skin is given.
+    pub(crate) fn gives_skin(&self, toml: &TomlText<'_>) -> bool {
+        is_given(toml, "skin_mm", self.skin_mm == Self::default().skin_mm)
     }
+
+    /// Whether the period is given.
+    pub(crate) fn gives_period(&self, toml: &TomlText<'_>) -> bool {
+        is_given(toml, "period_s", self.period_s == Self::default().period_s)
+    }
+}
+
+/// What a study changes has no text: there a value counts as given where it is not the default.
+fn is_given(toml: &TomlText<'_>, key: &str, is_usual: bool) -> bool {
+    !is_usual || toml.span_of(&format!("{PLACE}.{key}")).is_some()
 }
