@@ -492,14 +492,47 @@ def phases(block: dict, random: np.random.Generator, count: int) -> Array:
     return np.where(random.random(count) < block["hold_failure"], any_phase, met)
 
 
+# What the guide says of a level without keys of its own, 1 and 1/s, and of the drift of skin and target, mm/s.
+LEVEL = {"level_at_once": 0.045, "level_per_s": 0.0017}
+DRIFT_MM_S = {"skin_drift_mm_s": (0.0, 0.0, 0.0), "target_drift_mm_s": (0.0, 0.0, 0.15)}
+
+
+def given(block: dict, usual: dict) -> list:
+    """Values of keys, of the block or the usual ones."""
+    return [value if block.get(key) is None else block[key] for key, value in usual.items()]
+
+
+def levels(block: dict, random: np.random.Generator, count: int) -> Array:
+    """How far the end of expiration is from where the image shows it, of skin and target, as a share of the amplitude."""
+    if block.get("since_image_s") is None:
+        return np.zeros(count)
+    at_once, per_s = given(block, LEVEL)
+    variance = at_once**2 + (per_s * block["since_image_s"]) ** 2
+    return np.sqrt(variance) * random.standard_normal(count)
+
+
+def drifts(block: dict) -> Array:
+    """How far skin and target have drifted while the breath was held, m."""
+    held_s = block.get("held_s")
+    return np.array(given(block, DRIFT_MM_S)) * 1e-3 * (0.0 if held_s is None else held_s)
+
+
 def breathing(
     case: Case, block: dict, random: np.random.Generator, truth: Truth
 ) -> None:
-    """Skin and target move by `sin^4(pi phase)` of their amplitudes (Lujan 1999)."""
-    share = np.sin(np.pi * phases(block, random, truth.count)) ** 4
-    moves = (np.array(block[key]) * 1e-3 for key in ("skin_mm", "target_mm"))
+    """Skin and target move by a level and `sin^4(pi phase)` (Lujan 1999) of their amplitudes, and drift.
+
+    Beside a level, a breath that is held is at its phase exactly.
+    """
+    exact = {} if block.get("since_image_s") is None else {"phase_spread": 0.0}
+    share = np.sin(np.pi * phases(block | exact, random, truth.count)) ** 4
+    share = share + levels(block, random, truth.count)
+    amplitudes = (np.array(block[key]) * 1e-3 for key in ("skin_mm", "target_mm"))
     truth.breath = np.array(
-        [share[:, None] * (case.phantom_turn @ each) for each in moves]
+        [
+            share[:, None] * (case.phantom_turn @ each) + case.phantom_turn @ drift
+            for each, drift in zip(amplitudes, drifts(block), strict=True)
+        ]
     )
 
 

@@ -57,7 +57,7 @@ budget_samples = 400
 [imperfections.indentation]
 
 [imperfections.breathing]
-hold_failure = 0
+{breath}
 
 [imperfections.needle]
 {needle}
@@ -90,6 +90,7 @@ class Variant:
     goals: list[str]
     more: str = "[imperfections.guide]"
     phantom: str = "male-p50-supine"
+    breath: str = "hold_failure = 0"
 
     def written(self) -> str:
         goals = ""
@@ -97,7 +98,13 @@ class Variant:
             lesion, direction, offset, standoff = GOALS[name]
             goals += GOAL.format(name=name, lesion=lesion, direction=direction, offset=offset, standoff=standoff)
         return SCENARIO.format(
-            name=self.name, gauge=self.gauge, phantom=self.phantom, goals=goals, needle=self.needle, more=self.more
+            name=self.name,
+            gauge=self.gauge,
+            phantom=self.phantom,
+            goals=goals,
+            needle=self.needle,
+            more=self.more,
+            breath=self.breath,
         )
 
 
@@ -122,6 +129,13 @@ FITS = """
 [imperfections.guide]
 diametral_clearance_mm = 0
 """
+# A breath that is held for long and long after the image, with keys of its own and usual ones.
+LEVEL = """
+since_image_s = 90
+level_at_once = 0.1
+held_s = 15
+skin_drift_mm_s = [0, 0.05, 0]
+"""
 VARIANTS = [
     Variant("known", 18, TISSUE + 'bevel = "superior"', ["shallow", "deep"]),
     Variant("unknown", 20, TISSUE, ["middle"]),
@@ -134,6 +148,7 @@ VARIANTS = [
     Variant("aimed", 20, TISSUE + 'bevel = "3:00"\naim = true', ["lateral", "deep"]),
     Variant("best", 22, TISSUE + 'bevel = "9:00"\nturn_at = "best"\naim = true', ["deep"]),
     Variant("in_air", 18, 'model = "cantilever"', ["lateral"]),
+    Variant("level", 18, 'model = "cantilever"', ["lateral"], breath=LEVEL),
 ]
 
 
@@ -184,6 +199,8 @@ def play_twice(case, block, random, truth) -> None:
 CHANGES = {
     "force by stiffness to another power": ("stiff", bending, "FORCE_BY_STIFFNESS", 0.6),
     "no factor of the model": ("stiff", bending, "MODEL_SPREAD", 1.0),
+    "a level that does not grow": ("level", sources, "LEVEL", sources.LEVEL | {"level_per_s": 0.0}),
+    "no drift of the target": ("level", sources, "DRIFT_MM_S", dict.fromkeys(sources.DRIFT_MM_S, (0.0, 0.0, 0.0))),
     "play counted twice": ("unknown", sources, "needle_in_tissue", play_twice),
 }
 
