@@ -9,8 +9,8 @@ use needlebench_kinematics::Pose;
 use needlebench_phantom::{Phantom, Tissue};
 use needlebench_planning::{GoalPlan, NeedleStructure, needle_structures};
 use needlebench_probability::{
-    Anatomy, Body, Case, Draws, Estimate, Event, HalfPlane, LEAST_PRINTED, Law, Needle, Origin,
-    Structure, Told, at_most, bound_label, estimate, estimate_label,
+    Anatomy, Body, Bound, BoundKind, Case, Draws, Estimate, Event, HalfPlane, LEAST_PRINTED, Law,
+    Needle, Origin, Structure, Told, at_most, bound_label, estimate, estimate_label,
 };
 use needlebench_scenario::imperfections::Imperfections;
 use needlebench_scenario::{Goal, ResolvedScenario};
@@ -26,14 +26,17 @@ const MARGIN_M: f64 = 1e-3;
 /// The tip is to come so near to its point, m.
 const POINT_M: f64 = 2e-3;
 
-/// Structures that are farther from the planned needle, by this and a full breath, count together, m.
-const NEAR_M: f64 = 20e-3;
+/// What is farther from the planned needle, by this and a full breath, counts together, m.
+const NEAR_M: f64 = 12e-3;
 
 /// Standard deviations of boundaries that they are taken to be nearer by: none is by more (6e-16).
 const FAR: f64 = 8.0;
 
 /// Most draws of an estimate.
 const DRAWS: u64 = 100_000;
+
+/// Triangles of surfaces are cut until no edge is longer, m.
+const EDGE_M: f64 = 5e-3;
 
 /// Solids are taken for triangles that are farther inside by no more, m.
 const CHORD_M: f64 = 1e-4;
@@ -139,10 +142,10 @@ impl<'a> Surroundings<'a> {
         let section = &resolved.scenario.planning.needle_route;
         let imperfections = &resolved.expected.as_ref()?.imperfections;
         let seen = Boundaries::of(imperfections);
-        let breath_m = imperfections.breathing.map_or(0.0, |breathing| {
-            breathing.skin_m.norm().max(breathing.target_m.norm())
+        let breath_m = imperfections.breathing.map_or([0.0; 2], |breathing| {
+            [breathing.skin_m, breathing.target_m].map(|moved_m| moved_m.norm())
         });
-        let near_m = NEAR_M + breath_m;
+        let near_m = breath_m.map(|moved_m| NEAR_M + moved_m);
         let world_from_needle = world_from_needle(goal, &entry);
         let phantom_from_needle = placed.world_from_phantom.inverse() * world_from_needle;
         let needle_from_world = world_from_needle.inverse();
@@ -166,9 +169,6 @@ impl<'a> Surroundings<'a> {
                 (each, distance_m)
             })
             .collect();
-        let (near, others): (Vec<_>, Vec<_>) = all
-            .into_iter()
-            .partition(|(_, distance_m)| *distance_m < near_m);
         let mut structures = Vec::new();
         let mut places = Vec::new();
         let mut add = |name: &str, body, boundary_sd_m, covers, place| {
@@ -180,32 +180,46 @@ impl<'a> Surroundings<'a> {
             });
             places.push(place);
         };
-        for (obstacle, _) in &near {
+        let needle_from_phantom = phantom_from_needle.inverse();
+        let mut near = Vec::new();
+        let mut others = 0;
+        for (obstacle, distance_m) in all {
+            // The farthest that any body counts to.
+            if distance_m >= near_m[0].max(near_m[1]) {
+                others += 1;
+                continue;
+            }
             let parts = &phantom.route_obstacles().parts;
             let names = obstacle.parts.iter().map(|part| &parts[*part].name);
             let surfaces: Vec<Vec<Point3<f64>>> =
                 names.map(|name| corners_of(phantom, name)).collect();
             let body = body_of(obstacle.tissue, &surfaces, phantom);
-            let corners = surfaces.into_iter().flatten();
-            let corners: Vec<Point3<f64>> = corners
-                .map(|corner| phantom_from_needle.inverse() * corner)
-                .collect();
+            let within_m = near_m[of_body(body)];
+            if distance_m >= within_m {
+                others += 1;
+                continue;
+            }
+            let mut corners = Vec::new();
+            for triangle in surfaces.iter().flat_map(|each| each.chunks_exact(3)) {
+                let triangle = [0, 1, 2].map(|corner| needle_from_phantom * triangle[corner]);
+                add_near(
+                    triangle,
+                    needle.depth_m,
+                    within_m + needle.radius_m,
+                    &mut corners,
+                );
+            }
             let covers = HalfPlane::covers(&corners, 3, CHORD_M);
+            let sd_m = seen.of_m(obstacle.tissue);
             let place = Place::Parts(obstacle.parts.clone());
-            add(
-                obstacle.name,
-                body,
-                seen.of_m(obstacle.tissue),
-                covers,
-                place,
-            );
+            add(obstacle.name, body, sd_m, covers, place);
+            near.push((obstacle, distance_m));
         }
-        let distance_m = near_m + needle.radius_m - FAR * seen.soft_m.max(seen.bone_m);
         for body in [Body::Wall, Body::Lung] {
-            let depth_m = needle.depth_m;
+            let clear_m = near_m[of_body(body)] + needle.radius_m;
             let place = Place::Beyond {
-                distance_m,
-                depth_m,
+                distance_m: clear_m - FAR * seen.soft_m.max(seen.bone_m),
+                depth_m: needle.depth_m,
             };
             add("others", body, 0.0, Vec::new(), place);
         }
@@ -225,7 +239,7 @@ impl<'a> Surroundings<'a> {
         });
         Some(Self {
             near,
-            others: others.len(),
+            others,
             structures,
             around: Around {
                 solids,
@@ -250,12 +264,22 @@ impl<'a> Surroundings<'a> {
             structure,
             margin_m: MARGIN_M,
         };
-        let bound = |event: &Event| -> Result<f64, String> {
-            let bound = at_most(&about, event).map_err(|error| error.to_string())?;
-            Ok(bound.map_or(1.0, |bound| bound.probability))
+        let bound = |structure: usize| -> Result<Bound, String> {
+            let found = at_most(&about, &closer(structure)).map_err(|error| error.to_string())?;
+            found.ok_or_else(|| "no bound".to_owned())
         };
-        let each = (0..count + 2).map(|index| bound(&closer(index)));
-        let bounds: Vec<f64> = each.collect::<Result<_, String>>()?;
+        let beyond = [bound(count)?.probability, bound(count + 1)?.probability];
+        let mut bounds = Vec::new();
+        for structure in 0..count {
+            let Bound { probability, kind } = bound(structure)?;
+            // Planes hold what is near of it; what is not is beyond.
+            let more = match kind {
+                BoundKind::HalfPlanes => beyond[of_body(self.structures[structure].body)],
+                BoundKind::Stations | BoundKind::Sum => 0.0,
+            };
+            bounds.push((probability + more).min(1.0));
+        }
+        bounds.extend(beyond);
         let (told, left): (Vec<usize>, Vec<usize>) =
             (0..count).partition(|index| bounds[*index] >= LEAST_PRINTED);
         let mut events: Vec<Event> = told.iter().copied().map(closer).collect();
@@ -391,6 +415,52 @@ fn corners_of(phantom: &Phantom, name: &str) -> Vec<Point3<f64>> {
             .collect::<Vec<_>>()
     });
     corners.collect()
+}
+
+/// Where a body is among those of a scenario's breath.
+fn of_body(body: Body) -> usize {
+    match body {
+        Body::Wall => 0,
+        Body::Lung => 1,
+    }
+}
+
+/// Adds the corners of those pieces of a triangle, needle frame, that may be nearer to the axis between entry and tip than a
+/// distance, m: of no edge longer than [`EDGE_M`].
+fn add_near(
+    triangle: [Point3<f64>; 3],
+    depth_m: f64,
+    within_m: f64,
+    corners: &mut Vec<Point3<f64>>,
+) {
+    let [a, b, c] = triangle;
+    let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+    let on_axis = Point3::new(middle.x.clamp(0.0, depth_m), 0.0, 0.0);
+    let reach_m = triangle
+        .iter()
+        .map(|corner| (corner - middle).norm())
+        .fold(0.0, f64::max);
+    if (middle - on_axis).norm() - reach_m - CHORD_M > within_m {
+        return;
+    }
+    let turned = [[a, b, c], [b, c, a], [c, a, b]];
+    let length_m = |[from, to, _]: &[Point3<f64>; 3]| (to - from).norm();
+    let [first, second, third] = &turned;
+    let longest = [second, third].into_iter().fold(first, |longest, each| {
+        if length_m(each) > length_m(longest) {
+            each
+        } else {
+            longest
+        }
+    });
+    if length_m(longest) <= EDGE_M {
+        corners.extend(triangle);
+        return;
+    }
+    let [from, to, opposite] = *longest;
+    let between = nalgebra::center(&from, &to);
+    add_near([from, between, opposite], depth_m, within_m, corners);
+    add_near([between, to, opposite], depth_m, within_m, corners);
 }
 
 /// Bones and what is in no organ move with the chest wall; organs, and vessels most of whose parts are in one, as the target
@@ -543,5 +613,44 @@ mod tests {
                 "{event:?}"
             );
         }
+    }
+
+    /// What is dropped of a triangle is farther away than the distance.
+    #[test]
+    fn near_pieces_of_triangles_hold_all_that_is_near() {
+        const DEPTH_M: f64 = 0.08;
+        const WITHIN_M: f64 = 0.015;
+        let mut random = SplitMix64::new(9);
+        let mut place = |size_m: f64| {
+            let [x, y, z] = [0, 1, 2].map(|_| random.uniform(-size_m, size_m));
+            Point3::new(x, y, z)
+        };
+        let mut near = 0;
+        for _ in 0..200 {
+            let triangle = [place(0.1), place(0.1), place(0.1)];
+            let mut corners = Vec::new();
+            add_near(triangle, DEPTH_M, WITHIN_M, &mut corners);
+            for _ in 0..50 {
+                let shares = place(1.0).coords.map(f64::abs);
+                let shares = shares / shares.sum();
+                let [a, b, c] = triangle.map(|corner| corner.coords);
+                let point = Point3::from(a * shares.x + b * shares.y + c * shares.z);
+                let on_axis = Point3::new(point.x.clamp(0.0, DEPTH_M), 0.0, 0.0);
+                if (point - on_axis).norm() > WITHIN_M {
+                    continue;
+                }
+                near += 1;
+                let area = |a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>| {
+                    (b - a).cross(&(c - a)).norm()
+                };
+                let holds = |piece: &[Point3<f64>]| {
+                    let [a, b, c] = [&piece[0], &piece[1], &piece[2]];
+                    let parts = area(a, b, &point) + area(b, c, &point) + area(c, a, &point);
+                    parts < area(a, b, c) * (1.0 + 1e-9) + 1e-15
+                };
+                assert!(corners.chunks_exact(3).any(holds), "{point}");
+            }
+        }
+        assert!(near > 100, "{near}");
     }
 }

@@ -14,8 +14,14 @@ pub fn estimate_label(estimate: &Estimate) -> String {
     match (estimate.told, estimate.probability) {
         (Told::AtPlan, _) => "the planned path does already".to_owned(),
         (Told::Estimated, Some(probability)) if probability >= LEAST_PRINTED => {
+            // 999.6 of 1000 is not all of them.
+            let like = if probability < 0.5 {
+                probability
+            } else {
+                1.0 - interval.low
+            };
             let [value, low, high] =
-                [probability, interval.low, interval.high].map(|each| count(each, probability));
+                [probability, interval.low, interval.high].map(|each| count(each, like));
             format!("{value} ({low} to {high})")
         }
         (Told::Estimated, Some(_)) => format!("less than {}", least()),

@@ -27,6 +27,10 @@ fn estimates_are_counts_with_their_interval() {
         "0.0012 (less than 0.0010 to 0.0017)"
     );
     assert_eq!(estimated(1.0, 0.99, 1.0), "1000 (990 to 1000)");
+    assert_eq!(
+        estimated(0.9996, 0.9992, 0.9998),
+        "999.60 (999.20 to 999.80)"
+    );
 }
 
 #[test]

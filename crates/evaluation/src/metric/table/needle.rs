@@ -16,8 +16,11 @@ use crate::metric::readers::budget;
 
 const NEEDLE_RESOLUTION_RAD: f64 = 1e-5;
 
-/// Of estimates whose intervals are a tenth of them.
-const PROBABILITY_RESOLUTION: f64 = 1e-6;
+/// Five of 1000 needles, assumed: what 10 000 draws of a count near 950 can tell.
+const LESION_RESOLUTION: f64 = 5e-3;
+
+/// One of 1000 needles, assumed.
+const STRUCTURE_RESOLUTION: f64 = 1e-3;
 
 /// How likely the needle comes close to what of one tissue it most likely does.
 macro_rules! structure_probability {
@@ -31,7 +34,7 @@ macro_rules! structure_probability {
         )
         .only_in(&[])
         .known(Value, OverBudget, FinalPosture)
-        .better(Less, PROBABILITY_RESOLUTION)
+        .better(Less, STRUCTURE_RESOLUTION)
         .criterion($criterion, &[Dynamic], |criteria| {
             criteria.max_structure_probability.$tissue
         })
@@ -441,7 +444,7 @@ pub(super) const BUDGET: &[Metric] = &[
     )
     .only_in(&[])
     .known(Value, OverBudget, FinalPosture)
-    .better(More, PROBABILITY_RESOLUTION)
+    .better(More, LESION_RESOLUTION)
     .criterion("min_lesion_probability", &[Dynamic], |criteria| {
         criteria.min_lesion_probability
     })
