@@ -26,8 +26,10 @@ const MARGIN_M: f64 = 1e-3;
 /// The tip is to come so near to its point, m.
 const POINT_M: f64 = 2e-3;
 
-/// What is farther from the planned needle, by this and a full breath, counts together, m.
-const NEAR_M: f64 = 12e-3;
+/// What is farther beside the planned needle than the first, or before its entry and behind its tip than the second, by a full
+/// breath more, counts together, m.
+const BESIDE_M: f64 = 12e-3;
+const BEHIND_M: f64 = 30e-3;
 
 /// Standard deviations of boundaries that they are taken to be nearer by: none is by more (6e-16).
 const FAR: f64 = 8.0;
@@ -98,10 +100,45 @@ struct Around<'a> {
 enum Place {
     /// Parts of the phantom.
     Parts(Vec<usize>),
-    /// Farther than that from the axis of the planned needle, entry to tip.
-    Beyond { distance_m: f64, depth_m: f64 },
+    /// Outside of a cylinder.
+    Outside(Cylinder),
     /// Within a radius of a point, m.
     Ball(Point3<f64>, f64),
+}
+
+/// What is near a planned needle: a cylinder about its axis.
+#[derive(Clone, Copy)]
+struct Cylinder {
+    radius_m: f64,
+    /// Where it begins and ends along the needle, from the entry, m.
+    ends_m: [f64; 2],
+}
+
+impl Cylinder {
+    /// Of a body that a full breath moves so far, m.
+    fn new(needle: &Needle, breath_m: f64) -> Self {
+        let behind_m = BEHIND_M + breath_m;
+        Self {
+            radius_m: BESIDE_M + breath_m + needle.radius_m,
+            ends_m: [-behind_m, needle.depth_m + behind_m],
+        }
+    }
+
+    /// How far a point is from what is outside, m: negative outside, and no farther than it says.
+    fn depth_m(&self, point: &Point3<f64>) -> f64 {
+        let [from_m, to_m] = self.ends_m;
+        let beside_m = self.radius_m - point.coords.yz().norm();
+        beside_m.min(point.x - from_m).min(to_m - point.x)
+    }
+
+    /// Smaller by a distance, m.
+    fn within(self, by_m: f64) -> Self {
+        let [from_m, to_m] = self.ends_m;
+        Self {
+            radius_m: self.radius_m - by_m,
+            ends_m: [from_m + by_m, to_m - by_m],
+        }
+    }
 }
 
 impl Anatomy for Around<'_> {
@@ -111,13 +148,7 @@ impl Anatomy for Around<'_> {
                 let point = self.phantom_from_needle * point_m;
                 self.solids.distance_to_point_m(parts, &point)
             }
-            Place::Beyond {
-                distance_m,
-                depth_m,
-            } => {
-                let on_axis = Point3::new(point_m.x.clamp(0.0, *depth_m), 0.0, 0.0);
-                distance_m - (point_m - on_axis).norm()
-            }
+            Place::Outside(cylinder) => cylinder.depth_m(point_m),
             Place::Ball(middle, radius_m) => (point_m - middle).norm() - radius_m,
         }
     }
@@ -145,7 +176,6 @@ impl<'a> Surroundings<'a> {
         let breath_m = imperfections.breathing.map_or([0.0; 2], |breathing| {
             [breathing.skin_m, breathing.target_m].map(|moved_m| moved_m.norm())
         });
-        let near_m = breath_m.map(|moved_m| NEAR_M + moved_m);
         let world_from_needle = world_from_needle(goal, &entry);
         let phantom_from_needle = placed.world_from_phantom.inverse() * world_from_needle;
         let needle_from_world = world_from_needle.inverse();
@@ -154,6 +184,8 @@ impl<'a> Surroundings<'a> {
             throw_m: 0.0,
             radius_m: 0.5 * resolved.cell.tool.needle.outer_diameter_m,
         };
+        let cylinders = breath_m.map(|moved_m| Cylinder::new(&needle, moved_m));
+        let farthest_m = BEHIND_M + breath_m[0].max(breath_m[1]);
         let tip = entry + goal.axis.into_inner() * needle.depth_m;
         let distance_m = |obstacle: &NeedleStructure<'_>| {
             let wanted = |index: usize| obstacle.parts.contains(&index);
@@ -184,8 +216,7 @@ impl<'a> Surroundings<'a> {
         let mut near = Vec::new();
         let mut others = 0;
         for (obstacle, distance_m) in all {
-            // The farthest that any body counts to.
-            if distance_m >= near_m[0].max(near_m[1]) {
+            if distance_m >= farthest_m {
                 others += 1;
                 continue;
             }
@@ -194,20 +225,15 @@ impl<'a> Surroundings<'a> {
             let surfaces: Vec<Vec<Point3<f64>>> =
                 names.map(|name| corners_of(phantom, name)).collect();
             let body = body_of(obstacle.tissue, &surfaces, phantom);
-            let within_m = near_m[of_body(body)];
-            if distance_m >= within_m {
-                others += 1;
-                continue;
-            }
+            let cylinder = &cylinders[of_body(body)];
             let mut corners = Vec::new();
             for triangle in surfaces.iter().flat_map(|each| each.chunks_exact(3)) {
                 let triangle = [0, 1, 2].map(|corner| needle_from_phantom * triangle[corner]);
-                add_near(
-                    triangle,
-                    needle.depth_m,
-                    within_m + needle.radius_m,
-                    &mut corners,
-                );
+                add_near(triangle, cylinder, &mut corners);
+            }
+            if corners.is_empty() && distance_m > 0.0 {
+                others += 1;
+                continue;
             }
             let covers = HalfPlane::covers(&corners, 3, CHORD_M);
             let sd_m = seen.of_m(obstacle.tissue);
@@ -216,11 +242,8 @@ impl<'a> Surroundings<'a> {
             near.push((obstacle, distance_m));
         }
         for body in [Body::Wall, Body::Lung] {
-            let clear_m = near_m[of_body(body)] + needle.radius_m;
-            let place = Place::Beyond {
-                distance_m: clear_m - FAR * seen.soft_m.max(seen.bone_m),
-                depth_m: needle.depth_m,
-            };
+            let shift_m = FAR * seen.soft_m.max(seen.bone_m);
+            let place = Place::Outside(cylinders[of_body(body)].within(shift_m));
             add("others", body, 0.0, Vec::new(), place);
         }
         let target = Place::Ball(needle_from_world * goal.target_m, POINT_M);
@@ -425,22 +448,16 @@ fn of_body(body: Body) -> usize {
     }
 }
 
-/// Adds the corners of those pieces of a triangle, needle frame, that may be nearer to the axis between entry and tip than a
-/// distance, m: of no edge longer than [`EDGE_M`].
-fn add_near(
-    triangle: [Point3<f64>; 3],
-    depth_m: f64,
-    within_m: f64,
-    corners: &mut Vec<Point3<f64>>,
-) {
+/// Adds the corners of those pieces of a triangle, needle frame, that may reach into a cylinder: of no edge longer than
+/// [`EDGE_M`].
+fn add_near(triangle: [Point3<f64>; 3], cylinder: &Cylinder, corners: &mut Vec<Point3<f64>>) {
     let [a, b, c] = triangle;
     let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
-    let on_axis = Point3::new(middle.x.clamp(0.0, depth_m), 0.0, 0.0);
     let reach_m = triangle
         .iter()
         .map(|corner| (corner - middle).norm())
         .fold(0.0, f64::max);
-    if (middle - on_axis).norm() - reach_m - CHORD_M > within_m {
+    if cylinder.depth_m(&middle) < -(reach_m + CHORD_M) {
         return;
     }
     let turned = [[a, b, c], [b, c, a], [c, a, b]];
@@ -459,8 +476,8 @@ fn add_near(
     }
     let [from, to, opposite] = *longest;
     let between = nalgebra::center(&from, &to);
-    add_near([from, between, opposite], depth_m, within_m, corners);
-    add_near([between, to, opposite], depth_m, within_m, corners);
+    add_near([from, between, opposite], cylinder, corners);
+    add_near([between, to, opposite], cylinder, corners);
 }
 
 /// Bones and what is in no organ move with the chest wall; organs, and vessels most of whose parts are in one, as the target
@@ -615,11 +632,13 @@ mod tests {
         }
     }
 
-    /// What is dropped of a triangle is farther away than the distance.
+    /// What is dropped of a triangle is outside of the cylinder.
     #[test]
     fn near_pieces_of_triangles_hold_all_that_is_near() {
-        const DEPTH_M: f64 = 0.08;
-        const WITHIN_M: f64 = 0.015;
+        let cylinder = Cylinder {
+            radius_m: 0.015,
+            ends_m: [-0.03, 0.11],
+        };
         let mut random = SplitMix64::new(9);
         let mut place = |size_m: f64| {
             let [x, y, z] = [0, 1, 2].map(|_| random.uniform(-size_m, size_m));
@@ -629,14 +648,13 @@ mod tests {
         for _ in 0..200 {
             let triangle = [place(0.1), place(0.1), place(0.1)];
             let mut corners = Vec::new();
-            add_near(triangle, DEPTH_M, WITHIN_M, &mut corners);
+            add_near(triangle, &cylinder, &mut corners);
             for _ in 0..50 {
                 let shares = place(1.0).coords.map(f64::abs);
                 let shares = shares / shares.sum();
                 let [a, b, c] = triangle.map(|corner| corner.coords);
                 let point = Point3::from(a * shares.x + b * shares.y + c * shares.z);
-                let on_axis = Point3::new(point.x.clamp(0.0, DEPTH_M), 0.0, 0.0);
-                if (point - on_axis).norm() > WITHIN_M {
+                if cylinder.depth_m(&point) < 0.0 {
                     continue;
                 }
                 near += 1;
