@@ -151,6 +151,7 @@ const LAYERS: [(&str, &[&str]); 40] = [
             "urscript",
             "recorded",
             "study",
+            "probability",
             "uncertainty",
             "engine",
             "planning",

@@ -144,7 +144,7 @@ impl ProbabilityReport {
                 let words = event.in_words();
                 (
                     key,
-                    format!("not told apart from the limit {limit}: {words}"),
+                    format!("the interval holds the limit {limit}: {words}"),
                 )
             })
         });

@@ -8,8 +8,6 @@ mod mixture;
 mod planes;
 mod stations;
 
-pub(crate) use stations::OfBodies;
-
 use crate::case::{Anatomy, Case};
 use crate::event::{Event, EventError};
 

@@ -3,7 +3,6 @@
 use nalgebra::{Point3, Vector2};
 
 use crate::bend::turned;
-use crate::bound::OfBodies;
 use crate::breath::Body;
 use crate::draw::PathDraw;
 use crate::law::Law;
@@ -130,8 +129,6 @@ pub struct Case<'a, A> {
     /// By how much each is off its chord at most, m.
     chords_m: Vec<f64>,
     pub(crate) clearances: Vec<Clearance>,
-    /// For bounds.
-    pub(crate) stations: OfBodies,
 }
 
 /// Distances of the planned path from a structure.
@@ -189,7 +186,6 @@ impl<'a, A: Anatomy> Case<'a, A> {
             bends_m,
             chords_m,
             clearances: Vec::new(),
-            stations: OfBodies::default(),
         };
         for (index, structure) in structures.iter().enumerate() {
             let clearance = case.clearance(index, structure)?;

@@ -6,9 +6,8 @@ use crate::event::{Asked, Event, EventError};
 use crate::importance::{Drawn, Proposal, Search};
 use crate::influence::{Influence, Origin, Reweighting};
 use crate::interval::{
-    Difference, Interval, SIDES, share_interval, standard_error, weighted_interval,
+    Difference, Interval, LEAST_PRINTED, SIDES, share_interval, standard_error, weighted_interval,
 };
-use crate::words::LEAST_PRINTED;
 
 /// Most draws of an estimate.
 pub const MOST_DRAWS: u64 = 1_000_000;

@@ -5,6 +5,9 @@ use needlebench_numerics::beta;
 /// Confidence of every interval.
 pub const CONFIDENCE: f64 = 0.95;
 
+/// No probability below this is printed as a number.
+pub const LEAST_PRINTED: f64 = 1e-6;
+
 /// Probability that the true value is beyond one end.
 const TAIL: f64 = 0.5 * (1.0 - CONFIDENCE);
 

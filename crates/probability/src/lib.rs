@@ -52,7 +52,9 @@ pub use estimate::{
 };
 pub use event::{Event, EventError};
 pub use influence::{Influence, Origin};
-pub use interval::{CONFIDENCE, Difference, Interval, share_interval, weighted_interval};
+pub use interval::{
+    CONFIDENCE, Difference, Interval, LEAST_PRINTED, share_interval, weighted_interval,
+};
 pub use law::{Law, Part};
 pub use planes::HalfPlane;
-pub use words::{LEAST_PRINTED, bound_label, estimate_label};
+pub use words::{bound_label, estimate_label};

@@ -1,9 +1,7 @@
 //! Probabilities in words: counts of needles.
 
 use crate::estimate::{Estimate, Told};
-
-/// Nothing below this is printed as a number.
-pub const LEAST_PRINTED: f64 = 1e-6;
+use crate::interval::LEAST_PRINTED;
 
 /// Needles that are counted.
 const OF: f64 = 1000.0;

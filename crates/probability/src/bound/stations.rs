@@ -4,7 +4,6 @@
 //! that far to both sides, and how likely it is off by more is added.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
-use std::sync::OnceLock;
 
 use nalgebra::{Matrix3, Vector2};
 use needlebench_numerics::normal;
@@ -45,26 +44,20 @@ struct Stations {
     bent_m: Vec<Vec<f64>>,
 }
 
-/// Those of both bodies, found when first asked for.
-#[derive(Default)]
-pub(crate) struct OfBodies([OnceLock<Stations>; 2]);
-
-impl OfBodies {
-    fn of(&self, law: &Law, end: f64, body: Body) -> &Stations {
-        self.0[body.index()].get_or_init(|| {
-            let fraction = |station: usize| end * station as f64 / STRETCHES as f64;
-            let cut = |merged: usize| {
-                let stretches = 0..STRETCHES / merged;
-                let ends = stretches.map(|each| [each * merged, (each + 1) * merged].map(fraction));
-                ends.map(|ends| bent_m(law, ends)).collect()
-            };
-            Stations {
-                all: (0..=STRETCHES)
-                    .map(|station| Station::new(law, fraction(station), body))
-                    .collect(),
-                bent_m: MERGED.into_iter().map(cut).collect(),
-            }
-        })
+impl Stations {
+    fn new(law: &Law, end: f64, body: Body) -> Self {
+        let fraction = |station: usize| end * station as f64 / STRETCHES as f64;
+        let cut = |merged: usize| {
+            let stretches = 0..STRETCHES / merged;
+            let ends = stretches.map(|each| [each * merged, (each + 1) * merged].map(fraction));
+            ends.map(|ends| bent_m(law, ends)).collect()
+        };
+        Self {
+            all: (0..=STRETCHES)
+                .map(|station| Station::new(law, fraction(station), body))
+                .collect(),
+            bent_m: MERGED.into_iter().map(cut).collect(),
+        }
     }
 }
 
@@ -73,7 +66,7 @@ pub(super) fn bound<A: Anatomy>(case: &Case<'_, A>, structure: usize, margin_m: 
     let seen = &case.structures[structure];
     let needed_m = case.needle.radius_m + margin_m;
     let fraction = |station: usize| case.end() * station as f64 / STRETCHES as f64;
-    let Stations { all, bent_m } = case.stations.of(case.law, case.end(), seen.body);
+    let Stations { all, bent_m } = Stations::new(case.law, case.end(), seen.body);
     let shifts = boundary_cells(seen.boundary_sd_m);
     let along = Along::new(case, seen.body);
     let mut best = 1.0_f64;
@@ -86,7 +79,7 @@ pub(super) fn bound<A: Anatomy>(case: &Case<'_, A>, structure: usize, margin_m: 
     for beside_m in looked {
         let beyond = along.beyond(case, seen.body, beside_m);
         let beside = beside_m / case.needle.depth_m;
-        for (merged, bent_m) in MERGED.into_iter().zip(bent_m) {
+        for (merged, bent_m) in MERGED.into_iter().zip(&bent_m) {
             let clear_m: Vec<f64> = bent_m
                 .iter()
                 .enumerate()
