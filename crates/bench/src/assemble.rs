@@ -29,7 +29,7 @@ use needlebench_scenario::{Expected, Goal, ResolvedScenario};
 use needlebench_uncertainty::Source;
 
 use crate::adjudication::Adjudicated;
-use crate::budgets::Budgets;
+use crate::budgets::{Budgets, measured_and_assumed};
 use crate::events::{EventRun, events_report};
 use crate::needle::needle_report;
 use crate::probability::Probabilities;
@@ -195,11 +195,7 @@ fn own_in_words(imperfections: &Imperfections) -> &'static str {
 
 /// Which sources of the error budget were measured, and which are assumed; none where none was measured.
 fn bases_in_words(imperfections: &Imperfections) -> Option<String> {
-    let there = Source::ALL
-        .into_iter()
-        .filter(|source| source.is_in(imperfections));
-    let (measured, assumed): (Vec<Source>, Vec<Source>) =
-        there.partition(|source| source.is_measured_in(imperfections) == Some(true));
+    let (measured, assumed) = measured_and_assumed(imperfections);
     if measured.is_empty() {
         return None;
     }

@@ -3,6 +3,8 @@
 use needlebench_parallel::in_parallel;
 use needlebench_planning::{ConfigurationPlan, GoalPlan};
 use needlebench_scenario::Expected;
+use needlebench_scenario::imperfections::Imperfections;
+use needlebench_uncertainty::Source;
 use needlebench_uncertainty::budget::{
     BudgetCase, ErrorBudget, Moments, PointBudget, Samples, SourceBudget, budget, total_budget,
 };
@@ -67,6 +69,13 @@ pub(crate) fn analytic_budget(moments: [Moments; 2]) -> ErrorBudget {
         of_breath: None,
         breathing_freely: None,
     }
+}
+
+/// Sources of the error budget that were measured, and those that are assumed.
+pub(crate) fn measured_and_assumed(imperfections: &Imperfections) -> (Vec<Source>, Vec<Source>) {
+    let all = Source::ALL.into_iter();
+    let there = all.filter(|source| source.is_in(imperfections));
+    there.partition(|source| source.is_measured_in(imperfections) == Some(true))
 }
 
 /// What `of` says of every configuration with a motion, by goal and configuration; nothing without an arm and patient

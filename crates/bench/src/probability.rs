@@ -14,10 +14,9 @@ use needlebench_probability::{
 };
 use needlebench_scenario::imperfections::Imperfections;
 use needlebench_scenario::{Goal, ResolvedScenario};
-use needlebench_uncertainty::Source;
 use needlebench_uncertainty::budget::{BudgetCase, path_law};
 
-use crate::budgets::of_each;
+use crate::budgets::{measured_and_assumed, of_each};
 use crate::setup::Setup;
 
 /// How close is too close, m (assumed).
@@ -506,20 +505,13 @@ fn body_of(tissue: Tissue, parts: &[Vec<Point3<f64>>], phantom: &Phantom) -> Bod
 
 /// What of the model was not measured.
 fn assumed(imperfections: &Imperfections) -> Vec<String> {
-    let there = Source::ALL
-        .into_iter()
-        .filter(|source| source.is_in(imperfections));
-    let (measured, assumed): (Vec<Source>, Vec<Source>) =
-        there.partition(|source| source.is_measured_in(imperfections) == Some(true));
+    let (measured, assumed) = measured_and_assumed(imperfections);
     if measured.is_empty() {
         return vec!["all sources".to_owned()];
     }
-    let mut names: Vec<String> = assumed
-        .iter()
-        .map(|source| source.name().to_owned())
-        .collect();
-    names.push("boundaries in the image".to_owned());
-    names
+    let names = assumed.iter().map(|source| source.name());
+    let names = names.chain(["boundaries in the image"]);
+    names.map(str::to_owned).collect()
 }
 
 #[cfg(test)]

@@ -123,8 +123,8 @@ pub struct CriteriaSection {
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_tip_lateral_rms_mm: Option<f64>,
-    /// Minimum probability that the needle's tip is in the lesion, over the same population, 0 to 1. Goals that are no
-    /// lesion are not evaluated.
+    /// Minimum probability that the needle's tip is in the lesion, over the same population, 0 to 1. With a
+    /// target in no lesion it cannot be evaluated, and the verdict is `incomplete`.
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0), extend("x-off" = true))]
     pub min_lesion_probability: Option<f64>,
