@@ -44,7 +44,7 @@ pub(crate) struct Results<'a> {
     pub runs: &'a [Vec<Vec<EngineRun>>],
     pub events: &'a [EventRun],
     pub budgets: &'a Budgets,
-    pub probabilities: Probabilities,
+    pub probabilities: &'a Probabilities,
     /// By goal and configuration.
     pub adjudicated: &'a [Vec<Adjudicated>],
     /// Engines that were to measure everything.
@@ -58,6 +58,8 @@ pub(crate) struct Results<'a> {
 pub(crate) struct Context<'a> {
     pub setup: &'a Setup<'a>,
     pub budgets: &'a Budgets,
+    /// None if they are not requested.
+    pub probabilities: Option<&'a Probabilities>,
     /// None if the room is not requested.
     pub room: Option<RoomModel<'a>>,
     pub events: &'a [EventRun],
@@ -71,6 +73,7 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
     let context = Context {
         setup,
         budgets: results.budgets,
+        probabilities: Some(results.probabilities),
         room: Some(RoomModel::new(resolved)),
         events: results.events,
         engines: results.engines,
@@ -86,16 +89,6 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
             ..goal_report(&context, index, plan, runs, adjudicated)
         })
         .collect();
-    let probabilities = results.probabilities.into_iter().flatten();
-    let configurations = goals.iter_mut().flat_map(|goal| &mut goal.configurations);
-    for (configuration, found) in configurations.zip(probabilities) {
-        match found {
-            Some(Ok(found)) => configuration.probability = Some(found),
-            Some(Err(error)) => configuration.probability_failure = Some(error),
-            None => {}
-        }
-        set_measured(configuration);
-    }
     let (verdict, judged) = judge(
         &mut goals,
         &resolved.goals,
@@ -263,12 +256,19 @@ pub(crate) fn goal_report(
             .zip(runs)
             .zip(&context.budgets[goal_index])
             .zip(adjudicated)
-            .map(|(((plan, runs), budget), judged)| {
+            .enumerate()
+            .map(|(index, (((plan, runs), budget), judged))| {
                 let mut report =
                     configuration_report(context, goal_index, plan, runs, judged, route.as_ref());
                 match budget {
                     Some(Ok(budget)) => report.budget = Some(budget.clone()),
                     Some(Err(error)) => report.budget_failure = Some(error.clone()),
+                    None => {}
+                }
+                let probabilities = context.probabilities;
+                match probabilities.and_then(|all| all[goal_index][index].as_ref()) {
+                    Some(Ok(found)) => report.probability = Some(found.clone()),
+                    Some(Err(error)) => report.probability_failure = Some(error.clone()),
                     None => {}
                 }
                 set_measured(&mut report);

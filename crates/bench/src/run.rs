@@ -295,7 +295,7 @@ pub(crate) fn run_goals(
         runs: &runs,
         events: &events,
         budgets: &budgets,
-        probabilities,
+        probabilities: &probabilities,
         adjudicated: &adjudications.by_goal,
         engines: &engine_names(engines),
         failures,

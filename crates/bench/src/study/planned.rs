@@ -16,6 +16,7 @@ use crate::adjudication::Adjudicated;
 use crate::assemble::{Context, goal_report};
 use crate::budgets::total_budgets;
 use crate::events::EventRun;
+use crate::probability::probabilities;
 use crate::setup::Setup;
 use crate::simulate::EngineRun;
 
@@ -49,9 +50,15 @@ pub(super) fn case_report(
     let room_counts = criteria.min_free_fraction.is_some()
         || criteria.min_sight_fraction.is_some()
         || criteria.min_hand_cone_deg.is_some();
+    let plans = std::slice::from_ref(plan);
+    // A criterion of what is simulated.
+    let has_engines = !engines.is_empty();
+    let likely =
+        (has_engines && criteria.has_probability()).then(|| probabilities(setup, plans, 1));
     let context = Context {
         setup,
-        budgets: &total_budgets(setup, std::slice::from_ref(plan), !engines.is_empty()),
+        budgets: &total_budgets(setup, plans, has_engines),
+        probabilities: likely.as_ref(),
         room: room_counts.then(|| RoomModel::new(setup.resolved)),
         events,
         engines,

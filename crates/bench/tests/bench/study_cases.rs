@@ -126,11 +126,12 @@ fn is_that_of_a_run(text: &str) -> ([CaseRow; 8], GoalReport) {
     for (index, configuration) in report.configurations.iter().enumerate() {
         let label = configuration.label;
         let row = &rows[index];
-        // Whatever a run measures, but for the room, which nobody asked the case for, a dynamic case
-        // measures too.
+        // Whatever a run measures, but for the room and probabilities, which nobody asked the case for, a dynamic
+        // case measures too.
         let shared = has_the_numbers_of(&columns.row(index, row), &columns, configuration);
         let mut without_room = ConfigurationReport {
             room: None,
+            probability: None,
             ..configuration.clone()
         };
         set_measured(&mut without_room);
@@ -155,6 +156,28 @@ fn is_that_of_a_run(text: &str) -> ([CaseRow; 8], GoalReport) {
         assert_eq!(row.detail.is_empty(), outcome == Outcome::Ok, "{label}");
     }
     (rows, report)
+}
+
+#[test]
+fn a_criterion_on_a_probability_is_judged_in_a_case_as_in_a_run() {
+    let text = SMALL.replace(
+        "[criteria]",
+        "[criteria]\nmax_structure_probability = { bone = 0.5 }",
+    );
+    assert_ne!(text, SMALL);
+    let scenario = resolved(&text);
+    let report = of_run(&scenario);
+    let rows = dynamic_rows(&scenario, &both(), &pool()).unwrap();
+    let known = report.configurations.iter().zip(&rows);
+    let known = known.filter(|(configuration, row)| {
+        assert_eq!(configuration.probability, row.measured.probability);
+        assert_eq!(
+            configuration.status == Status::Ok,
+            row.outcome == Outcome::Ok
+        );
+        configuration.probability.is_some()
+    });
+    assert!(known.count() > 0);
 }
 
 #[test]

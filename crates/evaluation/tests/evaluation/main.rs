@@ -2,6 +2,7 @@
 
 mod adjudication;
 mod compare;
+mod likely;
 mod measurements;
 mod ranking;
 mod room;

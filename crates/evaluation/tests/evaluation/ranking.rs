@@ -16,6 +16,8 @@ use needlebench_scenario::ranking::{MetricRanking, RankingSection};
 use needlebench_uncertainty::budget::{ErrorBudget, Moments, PointBudget, SourceBudget};
 use proptest::prelude::*;
 
+use crate::likely::{event, probability_report};
+
 /// Sums of a dozen numbers from 0 to 1.
 const ROUNDING: f64 = 1e-12;
 
@@ -226,6 +228,10 @@ fn every_metric_is_read_from_a_report_that_has_everything() {
     let simulated = ConfigurationReport {
         room: Some(room(Some(true), None)),
         budget: Some(budget(3e-4)),
+        probability: Some(probability_report(
+            event(Some(0.95), [0.94, 0.96], None),
+            event(Some(1e-3), [0.9e-3, 1.1e-3], Some(0.01)),
+        )),
         ..configuration(0)
     };
     let planned = ConfigurationReport {

@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use needlebench_evaluation::probability::{
-    EventProbability, LesionProbability, ProbabilityReport, StructureProbability,
-};
+use needlebench_evaluation::probability::EventProbability;
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, GoalReport, MarginsReport,
     RejectionReport, Status, Verdict,
@@ -17,6 +15,8 @@ use needlebench_kinematics::ik::Configuration;
 use needlebench_scenario::scenario::{ClearanceCriteria, CriteriaSection};
 use needlebench_scenario::study::StudyMode;
 use needlebench_scenario::{Expectation, Goal, Overrides, load_scenario};
+
+use crate::likely::{event, probability_report};
 
 /// Configuration `index` with a least clearance to the skin and a joint margin, not yet judged.
 fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationReport {
@@ -260,47 +260,10 @@ fn a_limit_on_true_targets_says_nothing_of_goals_without_one() {
     }
 }
 
-fn event(
-    probability: Option<f64>,
-    interval_95: [f64; 2],
-    at_most: Option<f64>,
-) -> EventProbability {
-    EventProbability {
-        probability,
-        interval_95,
-        at_most,
-        of_1000: "so many".to_owned(),
-        at_most_of_1000: at_most.map(|_| "at most so many".to_owned()),
-        mostly: None,
-        draws: 10_000,
-    }
-}
-
 /// What the criteria on probabilities make of a lesion and a vessel with these estimates.
 fn judged_probabilities(lesion: EventProbability, vessel: EventProbability) -> [Option<bool>; 2] {
     let mut found = configuration(0, 0.05, 0.5);
-    found.probability = Some(ProbabilityReport {
-        in_lesion: Some(LesionProbability {
-            lesion: "a".to_owned(),
-            diameter_m: 0.01,
-            boundary_sd_m: 0.0,
-            event: lesion,
-        }),
-        within_2_mm: event(Some(0.5), [0.4, 0.6], None),
-        structures: vec![StructureProbability {
-            structure: "vessel".to_owned(),
-            tissue: "vessel".to_owned(),
-            distance_m: 0.004,
-            boundary_sd_m: 0.0,
-            moves_with: "wall",
-            event: vessel,
-        }],
-        any: None,
-        margin_m: 1e-3,
-        others: 3,
-        others_at_most: 1e-9,
-        assumed: Vec::new(),
-    });
+    found.probability = Some(probability_report(lesion, vessel));
     let mut criteria = CriteriaSection {
         min_lesion_probability: Some(0.9),
         ..CriteriaSection::default()

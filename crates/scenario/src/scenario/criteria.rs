@@ -179,6 +179,19 @@ pub struct CriteriaSection {
     pub min_hand_cone_deg: Option<f64>,
 }
 
+impl CriteriaSection {
+    /// Whether there is a limit on a probability.
+    pub fn has_probability(&self) -> bool {
+        let StructureCriteria {
+            bone,
+            vessel,
+            organ,
+        } = self.max_structure_probability;
+        let all = [self.min_lesion_probability, bone, vessel, organ];
+        all.iter().any(Option::is_some)
+    }
+}
+
 impl Default for CriteriaSection {
     fn default() -> Self {
         Self {
