@@ -78,6 +78,7 @@ pub(crate) fn needle_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<
             Some(_) => Some(aimed_rms_m(needle, goal, path, &sizes_m)?),
             None => None,
         },
+        by_hub_m: needle.bend_by_hub_m(path, tool.needle.length_m).ok(),
         alternatives: alternatives(resolved, needle, goal),
         breath: expected
             .imperfections

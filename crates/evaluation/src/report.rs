@@ -209,6 +209,8 @@ pub struct NeedleReport {
     /// Root mean square of what is left if the axis is aimed against the mean bend, as it is where `aim_m` is given; none where
     /// the direction is not known.
     pub aimed_rms_m: Option<f64>,
+    /// How far the median needle would bend if a hand held it by its hub, without a guide; none for one that is too short.
+    pub by_hub_m: Option<f64>,
     /// What other needles, guides and hands would give.
     pub alternatives: Vec<NeedleAlternative>,
     /// What a full breath does to the needle once it is in; none for a patient who does not breathe.

@@ -37,6 +37,10 @@ pub(crate) fn needle_blocks(needle: &NeedleReport) -> Vec<Block> {
         };
         rms_alone(what, rms_m)
     });
+    let by_hub = needle.by_hub_m.map(|bend_m| {
+        let (what, none) = ("held by its hub, without a guide", "-".to_owned());
+        vec![what.to_owned(), one(bend_m), none.clone(), none]
+    });
     let others = needle
         .alternatives
         .iter()
@@ -56,6 +60,7 @@ pub(crate) fn needle_blocks(needle: &NeedleReport) -> Vec<Block> {
             own.into_iter()
                 .chain(turned)
                 .chain(aimed)
+                .chain(by_hub)
                 .chain(others)
                 .collect(),
         ),

@@ -322,6 +322,7 @@ impl TissueNeedle {
         &self,
         draw: &NeedleDraw,
         path: &NeedlePath,
+        holder: &Holder,
         stand_off_m: f64,
         solve: impl Fn(&Needle, &Holder, f64, &Layers, &Bevel) -> Result<T, InsertionError>,
     ) -> Result<T, TissueError> {
@@ -331,13 +332,7 @@ impl TissueNeedle {
             angle_rad: self.bevel_rad,
             turn_at_m: path.turn_at_m,
         };
-        Ok(solve(
-            &draw.needle,
-            &self.holder(),
-            stand_off_m,
-            &layers,
-            &bevel,
-        )?)
+        Ok(solve(&draw.needle, holder, stand_off_m, &layers, &bevel)?)
     }
 
     /// Where a needle is pushed on its way, if that is known: see [`NeedlePath::pushed_towards`].
@@ -355,7 +350,19 @@ impl TissueNeedle {
         path: &NeedlePath,
         stand_off_m: f64,
     ) -> Result<Insertion, TissueError> {
-        self.inserted(draw, path, stand_off_m, needlebench_insertion::insert)
+        let insert = needlebench_insertion::insert;
+        self.inserted(draw, path, &self.holder(), stand_off_m, insert)
+    }
+
+    /// How far the median needle is off the axis at the end of its way, m, when a hand holds it by its hub and moves on with it,
+    /// without a guide: what the guide is worth. The needle is `length_m` long from hub to tip.
+    ///
+    /// # Errors
+    /// [`TissueError`] for a needle that is too short for the way.
+    pub fn bend_by_hub_m(&self, path: &NeedlePath, length_m: f64) -> Result<f64, TissueError> {
+        let ends = needlebench_insertion::ends;
+        let ends_m = self.inserted(&self.medians(), path, &Holder::Hub(length_m), 0.0, ends)?;
+        Ok(ends_m[1][0])
     }
 
     /// The median needle at the end of its way.
@@ -499,7 +506,8 @@ impl TissueNeedle {
         path: &NeedlePath,
         stand_off_m: f64,
     ) -> Result<[f64; 2], TissueError> {
-        let ends = self.inserted(draw, path, stand_off_m, needlebench_insertion::ends)?;
+        let ends = needlebench_insertion::ends;
+        let ends = self.inserted(draw, path, &self.holder(), stand_off_m, ends)?;
         Ok(ends.map(|[towards, _]| towards))
     }
 }
