@@ -21,11 +21,11 @@
 use std::collections::VecDeque;
 
 use needlebench_cell::GearTwist;
-use needlebench_kinematics::trajectory::{JointState, JointTrajectory};
+use needlebench_kinematics::trajectory::JointState;
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 use needlebench_numerics::random::NormalPairs;
 
-use crate::{EngineError, Servo};
+use crate::{EngineError, Reference, Servo};
 
 /// Rounding of `t / period` that still counts as a whole number of periods.
 const PERIOD_SLACK: f64 = 1e-9;
@@ -306,16 +306,16 @@ impl<'a> Drives<'a> {
     }
 
     /// Torques of the step that starts at `time_s` with the arm at `position`, `velocity`; `planned`
-    /// is the trajectory at that time.
+    /// is what is followed at that time.
     pub(crate) fn torque(
         &mut self,
-        trajectory: &JointTrajectory,
+        followed: &dyn Reference,
         time_s: f64,
         planned: &JointState,
         position: &Joints,
         velocity: &Joints,
     ) -> ActuatedTorque {
-        let reference = self.reference(trajectory, time_s, planned);
+        let reference = self.reference(followed, time_s, planned);
         let forward_nm = self.forward_nm(&reference);
         let wanted = self
             .servo
@@ -361,21 +361,16 @@ impl<'a> Drives<'a> {
     /// positions follow the trajectory to second order, while the velocities belong half a step
     /// earlier (the plant says how old its velocities are). Taking the velocity there removes a bias of `kd * h / 2 * qdd`, which is 0.3 N m at
     /// 10 rad/s^2 and 1 ms.
-    fn reference(
-        &self,
-        trajectory: &JointTrajectory,
-        time_s: f64,
-        planned: &JointState,
-    ) -> JointState {
+    fn reference(&self, followed: &dyn Reference, time_s: f64, planned: &JointState) -> JointState {
         let velocity_s = (time_s - self.velocity_age_s).max(0.0);
         match self.actuation.commands {
             None => JointState {
-                velocity: trajectory.sample(velocity_s).velocity,
+                velocity: followed.sample(velocity_s).velocity,
                 ..*planned
             },
             Some(timing) => JointState {
-                velocity: timing.at(trajectory, velocity_s).velocity,
-                ..timing.at(trajectory, time_s)
+                velocity: timing.at(followed, velocity_s).velocity,
+                ..timing.at(followed, time_s)
             },
         }
     }
@@ -384,7 +379,7 @@ impl<'a> Drives<'a> {
     /// in the run itself.
     pub(crate) fn reading(
         &mut self,
-        trajectory: &JointTrajectory,
+        followed: &dyn Reference,
         time_s: f64,
         planned: &JointState,
         position: &Joints,
@@ -393,8 +388,8 @@ impl<'a> Drives<'a> {
         let target = self
             .actuation
             .commands
-            .map_or(*planned, |timing| timing.at(trajectory, time_s));
-        let reference = self.reference(trajectory, time_s, planned);
+            .map_or(*planned, |timing| timing.at(followed, time_s));
+        let reference = self.reference(followed, time_s, planned);
         let error = if self.ideal {
             Joints::zeros()
         } else {
@@ -470,14 +465,14 @@ impl<'a> Drives<'a> {
 
 impl CommandTiming {
     /// What the servo follows at a time.
-    fn at(&self, trajectory: &JointTrajectory, time_s: f64) -> JointState {
+    fn at(&self, followed: &dyn Reference, time_s: f64) -> JointState {
         let arrived_s = time_s - self.delay_s;
         if arrived_s < 0.0 {
-            return JointState::at_rest(trajectory.sample(0.0).position);
+            return JointState::at_rest(followed.sample(0.0).position);
         }
         let periods = (arrived_s / self.period_s + PERIOD_SLACK).floor();
-        let newest = trajectory.sample(periods * self.period_s);
-        let before = trajectory.sample((periods - 1.0).max(0.0) * self.period_s);
+        let newest = followed.sample(periods * self.period_s);
+        let before = followed.sample((periods - 1.0).max(0.0) * self.period_s);
         let share = (arrived_s / self.period_s - periods).clamp(0.0, 1.0);
         JointState {
             position: before.position.lerp(&newest.position, share),

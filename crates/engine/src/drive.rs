@@ -1,12 +1,12 @@
 //! One motion of one arm: what torque the plant gets next, and what it did.
 
-use needlebench_kinematics::trajectory::{JointState, JointTrajectory};
+use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, JOINT_LABELS, Joints};
 
 use crate::actuation::Drives;
 use crate::{
     ActuatedTorque, Actuation, Brakes, Cost, EngineError, EngineIdentity, PlantState, Recording,
-    Servo,
+    Reference, Servo,
 };
 
 /// Speed that no arm reaches, rad/s: 16 times the fastest joint of a UR3.
@@ -61,18 +61,18 @@ pub struct Braking<'a> {
 ///
 /// ```text
 /// drive.record(plant.begin(motion.trajectory))
-/// while let Some(torque) = drive.torque()? { drive.record(plant.step(&torque)?)? }
-/// drive.finish()
+/// while let Some(torque) = drive.torque(reference)? { drive.record(plant.step(&torque)?)? }
+/// drive.finish(reference)
 /// ```
 #[derive(Debug)]
 pub(crate) struct Drive<'a> {
-    trajectory: &'a JointTrajectory,
     drives: Drives<'a>,
-    steps: usize,
+    /// Steps that there are; without an end if none.
+    steps: Option<usize>,
     braking: Option<Braking<'a>>,
     keep: Keep<'a>,
-    /// State and reference after the last step.
-    now: Option<(PlantState, JointState)>,
+    /// State after the last step.
+    now: Option<PlantState>,
     /// Steps that were made.
     step: usize,
     /// Times that states were kept for.
@@ -97,25 +97,40 @@ impl<'a> Drive<'a> {
         timestep_s: f64,
         velocity_age_s: f64,
     ) -> Result<Self, EngineError> {
-        let Motion {
-            servo,
-            actuation,
-            trajectory,
-            braking,
-            keep,
-        } = *motion;
-        servo.check()?;
-        actuation.check()?;
-        let steps = step_count(trajectory.duration_s(), timestep_s);
-        let kept = match keep {
+        let steps = step_count(motion.trajectory.duration_s(), timestep_s);
+        let kept = match motion.keep {
             Keep::Steps => steps,
             Keep::Near(times_s) => times_s.len(),
         };
+        let parts = (motion.servo, motion.actuation, motion.keep);
+        let mut drive = Self::unbounded(parts, engine, timestep_s, velocity_age_s)?;
+        drive.steps = Some(steps);
+        drive.braking = motion.braking;
+        let recording = &mut drive.recording;
+        recording.time_s.reserve_exact(kept + 1);
+        recording.state.reserve_exact(kept + 1);
+        recording.reference.reserve_exact(kept + 1);
+        recording.torque_nm.reserve_exact(kept);
+        recording.drive_nm.reserve_exact(kept);
+        Ok(drive)
+    }
+
+    /// The same without an end.
+    ///
+    /// # Errors
+    /// As [`Drive::new`].
+    pub(crate) fn unbounded(
+        (servo, actuation, keep): (&'a Servo, &'a Actuation, Keep<'a>),
+        engine: EngineIdentity,
+        timestep_s: f64,
+        velocity_age_s: f64,
+    ) -> Result<Self, EngineError> {
+        servo.check()?;
+        actuation.check()?;
         Ok(Self {
-            trajectory,
             drives: Drives::new(servo, actuation, timestep_s, velocity_age_s),
-            steps,
-            braking,
+            steps: None,
+            braking: None,
             keep,
             now: None,
             step: 0,
@@ -125,11 +140,11 @@ impl<'a> Drive<'a> {
                 engine,
                 timestep_s,
                 velocity_age_s,
-                time_s: Vec::with_capacity(kept + 1),
-                state: Vec::with_capacity(kept + 1),
-                reference: Vec::with_capacity(kept + 1),
-                torque_nm: Vec::with_capacity(kept),
-                drive_nm: Vec::with_capacity(kept),
+                time_s: Vec::new(),
+                state: Vec::new(),
+                reference: Vec::new(),
+                torque_nm: Vec::new(),
+                drive_nm: Vec::new(),
                 saturated_steps: 0,
                 saturation: Default::default(),
                 cost: Cost::default(),
@@ -144,12 +159,19 @@ impl<'a> Drive<'a> {
     ///
     /// # Panics
     /// If no state was recorded yet.
-    pub(crate) fn torque(&mut self) -> Result<Option<Joints>, EngineError> {
-        if self.step >= self.steps {
+    pub(crate) fn torque(
+        &mut self,
+        followed: &dyn Reference,
+    ) -> Result<Option<Joints>, EngineError> {
+        if self.steps.is_some_and(|steps| self.step >= steps) {
             return Ok(None);
         }
-        let (state, planned) = self.now.expect("recorded after reset");
+        let state = self.now.expect("recorded after reset");
         let time_s = self.step as f64 * self.recording.timestep_s;
+        let planned = followed.sample(time_s);
+        if self.is_kept {
+            self.recording.reference.push(planned);
+        }
         let braking = self
             .braking
             .filter(|braking| time_s >= braking.from_s - STEP_SLACK * self.recording.timestep_s);
@@ -165,13 +187,8 @@ impl<'a> Drive<'a> {
                 saturated: [false; JOINT_COUNT],
             }
         } else {
-            self.drives.torque(
-                self.trajectory,
-                time_s,
-                &planned,
-                &state.position,
-                &state.velocity,
-            )
+            self.drives
+                .torque(followed, time_s, &planned, &state.position, &state.velocity)
         };
         check_torque(self.recording.engine.name, time_s, &torque.drive_nm)?;
         self.recording.saturated_steps += usize::from(torque.saturated.contains(&true));
@@ -195,14 +212,12 @@ impl<'a> Drive<'a> {
     /// [`EngineError::Diverged`] if it left every sensible range; it is kept all the same.
     pub(crate) fn record(&mut self, state: PlantState) -> Result<(), EngineError> {
         let time_s = self.step as f64 * self.recording.timestep_s;
-        let reference = self.trajectory.sample(time_s);
-        self.now = Some((state, reference));
+        self.now = Some(state);
         self.is_kept = self.is_wanted(time_s);
         let recording = &mut self.recording;
         if self.is_kept {
             recording.time_s.push(time_s);
             recording.state.push(state);
-            recording.reference.push(reference);
         }
         check_state(recording.engine.name, time_s, &state)
     }
@@ -222,19 +237,34 @@ impl<'a> Drive<'a> {
     }
 
     /// The recording; its cost is the caller's to fill in.
-    pub(crate) fn finish(self) -> Recording {
+    pub(crate) fn finish(mut self, followed: &dyn Reference) -> Recording {
+        self.add_reference(followed);
         self.recording
+    }
+
+    /// The reference of a state from which no step began.
+    fn add_reference(&mut self, followed: &dyn Reference) {
+        let recording = &mut self.recording;
+        if recording.reference.len() < recording.state.len() {
+            let time_s = self.step as f64 * recording.timestep_s;
+            recording.reference.push(followed.sample(time_s));
+        }
     }
 
     /// The error with what was recorded until it came: [`EngineError::Stopped`]. Errors that are
     /// not the motion's own stay as they are.
-    pub(crate) fn stopped_by(self, error: EngineError) -> EngineError {
+    pub(crate) fn stopped_by(
+        mut self,
+        followed: &dyn Reference,
+        error: EngineError,
+    ) -> EngineError {
         if !matches!(
             error,
             EngineError::Diverged { .. } | EngineError::Unstable { .. }
         ) {
             return error;
         }
+        self.add_reference(followed);
         let mut recording = self.recording;
         let sensible = |state: &PlantState| check_state("", 0.0, state).is_ok();
         let count = recording.state.iter().take_while(|s| sensible(s)).count();

@@ -111,7 +111,7 @@ pub fn simulate_fleet(
         torques.clear();
         let mut ended: Vec<(usize, Option<EngineError>)> = Vec::new();
         for (place, each) in active.iter_mut().enumerate() {
-            match each.drive.torque() {
+            match each.drive.torque(motions[each.motion].trajectory) {
                 Ok(Some(torque_nm)) => torques.push((each.arm, torque_nm)),
                 Ok(None) => ended.push((place, None)),
                 Err(error) => ended.push((place, Some(error))),
@@ -121,10 +121,11 @@ pub fn simulate_fleet(
         for (place, error) in ended.into_iter().rev() {
             let done = active.remove(place);
             idle.push(done.arm);
+            let followed = motions[done.motion].trajectory;
             let result = if let Some(error) = error {
-                Err(done.drive.stopped_by(error))
+                Err(done.drive.stopped_by(followed, error))
             } else {
-                let mut recording = done.drive.finish();
+                let mut recording = done.drive.finish(followed);
                 recording.cost.wall = done.wall;
                 Ok(recording)
             };
@@ -151,7 +152,8 @@ pub fn simulate_fleet(
         for (place, error) in failed.into_iter().rev() {
             let done = active.remove(place);
             idle.push(done.arm);
-            finished(done.motion, Err(done.drive.stopped_by(error)));
+            let followed = motions[done.motion].trajectory;
+            finished(done.motion, Err(done.drive.stopped_by(followed, error)));
         }
         steps += torques.len();
         if let Some(progress) = hooks.progress.as_mut() {
@@ -171,7 +173,7 @@ fn begin<'a>(
     let mut drive = Drive::new(motion, identity, timestep_s, fleet.velocity_age_s())?;
     let begun = fleet.begin(arm, motion.trajectory);
     if let Err(error) = begun.and_then(|state| drive.record(state)) {
-        return Err(drive.stopped_by(error));
+        return Err(drive.stopped_by(motion.trajectory, error));
     }
     Ok(Active {
         motion: index,
