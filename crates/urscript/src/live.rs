@@ -50,7 +50,7 @@ impl Live<'_> {
     /// The tool's point in the flange's frame.
     pub fn tcp(&self, call: &Call) -> Result<Pose, ScriptError> {
         let known = self.host.belief().flange_from_tcp;
-        known.ok_or_else(|| call.error("no TCP is set"))
+        known.ok_or_else(|| call.error("no TCP is set, and that of the installation is not known"))
     }
 }
 

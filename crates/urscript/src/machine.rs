@@ -107,7 +107,7 @@ impl<'a> Machine<'a> {
         }
         let message = format!("`{name}` {reason}: only fixed arguments are judged");
         ScriptError::new(place, message)
-            .hint("run the program in the controller's simulator, and judge its RTDE log")
+            .hint("run it with `needlebench robot`, or judge the RTDE log of a run")
     }
 
     /// The tool's point in the flange's frame.
