@@ -145,6 +145,7 @@ pub(crate) fn judge(
             between: curve(py, between)?,
             any_start,
             beside,
+            nearest: false,
         },
         results: Results {
             mcap: is_mcap(py, record, out.is_some())?,

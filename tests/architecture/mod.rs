@@ -148,6 +148,7 @@ const LAYERS: [(&str, &[&str]); 40] = [
             "evaluation",
             "patient",
             "routing",
+            "controller",
             "urscript",
             "recorded",
             "study",

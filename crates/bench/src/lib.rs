@@ -32,6 +32,7 @@ mod ranked;
 mod real_cell;
 pub mod record_plan;
 pub mod replay;
+pub mod robot;
 mod rtde;
 mod run;
 mod runnable;

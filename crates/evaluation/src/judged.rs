@@ -23,6 +23,77 @@ pub struct JudgedReport {
     pub duration_s: f64,
     /// The goals at which it holds, in its order.
     pub holds: Vec<HoldReport>,
+    /// The program that made it, where one was run on the virtual controller.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub program: Option<ProgramReport>,
+}
+
+/// Criterion on the end of a program that was run on the virtual controller.
+pub const PROGRAM_END: &str = "program_end";
+
+/// A program that was run on the virtual controller, whose set-points are the motion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ProgramReport {
+    /// Engine whose arm it moved, and read.
+    pub engine: &'static str,
+    /// Time between two set-points, s.
+    pub period_s: f64,
+    /// How it ended.
+    pub end: ProgramEnd,
+    /// When, s of the motion.
+    pub ended_s: f64,
+    /// The end in words, with the reason.
+    pub detail: String,
+    /// What happened, in the order of the times.
+    pub events: Vec<ProgramEvent>,
+    /// Further events, which are not listed.
+    pub more_events: usize,
+}
+
+/// How a program on the virtual controller ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ProgramEnd {
+    /// It came to its end.
+    Finished,
+    /// By `halt`.
+    Halted,
+    /// It was ended as asked: after a time, or once the arm held at a goal.
+    AsAsked,
+    /// By a runtime exception.
+    Exception,
+    /// By a protective stop.
+    ProtectiveStop,
+    /// It had not ended after the longest time.
+    TimeLimit,
+    /// The engine could not carry on.
+    EngineFailed,
+    /// The run was interrupted.
+    Interrupted,
+}
+
+impl ProgramEnd {
+    /// Whether the program ended as programs do; none where it was not let go on to its end.
+    pub fn is_regular(self) -> Option<bool> {
+        match self {
+            Self::Finished | Self::Halted | Self::AsAsked => Some(true),
+            Self::Exception | Self::ProtectiveStop => Some(false),
+            Self::TimeLimit | Self::EngineFailed | Self::Interrupted => None,
+        }
+    }
+}
+
+/// Something that happened while a program ran.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ProgramEvent {
+    /// When, s of the motion.
+    pub time_s: f64,
+    /// Line of the program, from 1, that it is of; none where that is not known.
+    pub line: Option<usize>,
+    /// Kind: `message`, `popup`, `output`, `not_simulated`, `reduced`, `stop`, `contact`, `clearance`, `end`.
+    pub kind: &'static str,
+    /// In words.
+    pub text: String,
 }
 
 /// A goal at which a motion holds.

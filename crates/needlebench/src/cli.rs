@@ -15,9 +15,9 @@ use crate::command::{
     CompareArguments, CtArguments, DOCTOR_HELP, DoctorArguments, ExportArguments, FkArguments,
     ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, JUDGE_HELP, JudgeArguments,
     MergeArguments, NeedleArguments, PairsArguments, PaperArguments, REPLAY_HELP, REPORT_HELP,
-    RecordPlanArguments, ReplayArguments, ReportArguments, RunArguments, SEARCH_HELP, STUDY_HELP,
-    SchemaFormat, SearchArguments, ServoArguments, StudyArguments, SuggestArguments, VIEW_HELP,
-    ViewArguments,
+    ROBOT_HELP, RecordPlanArguments, ReplayArguments, ReportArguments, RobotCommandArguments,
+    RunArguments, SEARCH_HELP, STUDY_HELP, SchemaFormat, SearchArguments, ServoArguments,
+    StudyArguments, SuggestArguments, VIEW_HELP, ViewArguments,
 };
 use crate::exit::ExitStatus;
 use crate::failure::Failure;
@@ -143,6 +143,12 @@ enum Command {
         after_long_help = JUDGE_HELP
     )]
     Judge(Box<JudgeArguments>),
+    /// Run a program in URScript on a virtual controller, and judge what the arm does.
+    #[command(
+        after_help = "Example: needlebench robot scenarios/table3.toml --script my.script",
+        after_long_help = ROBOT_HELP
+    )]
+    Robot(Box<RobotCommandArguments>),
     /// Insert a needle into tissue by itself; find the force across its tip from recorded bends.
     #[command(after_help = "Example: needlebench needle insert guide/examples/needle.toml")]
     Needle(NeedleArguments),
@@ -284,6 +290,7 @@ fn carried_out(command: Command) -> Result<ExitStatus, Failure> {
         Command::RecordPlan(arguments) => command::record_plan(&arguments),
         Command::Replay(arguments) => command::replay(&arguments),
         Command::Judge(arguments) => command::judge(&arguments),
+        Command::Robot(arguments) => command::robot(&arguments),
         Command::Needle(arguments) => command::needle(&arguments),
         Command::Breath(arguments) => command::breath(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),

@@ -34,6 +34,7 @@ use course::Course;
 use peaks::{peaks, results};
 
 pub use program::{InstalledTcp, is_program, read_program};
+pub(crate) use program::{controller_of, differences, nearest_joints, program_text, wrong_program};
 
 /// How a motion is judged.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -46,6 +47,8 @@ pub struct JudgeOptions {
     pub any_start: bool,
     /// Needlebench plans to the same goals beside it.
     pub beside: bool,
+    /// Where it stands at no goal it is judged by the one that it stands nearest to, and not refused.
+    pub nearest: bool,
 }
 
 /// Why no verdict is given on a motion.
@@ -78,8 +81,8 @@ pub struct JudgedRun {
 const SAME_START_RAD: f64 = 0.017_453_292_519_943_295;
 
 /// A guide is at a goal within this of its place, m, and of its axis, rad (5 degrees).
-const AT_GOAL_M: f64 = 0.02;
-const AT_GOAL_RAD: f64 = 0.087_266_462_599_716_48;
+pub(crate) const AT_GOAL_M: f64 = 0.02;
+pub(crate) const AT_GOAL_RAD: f64 = 0.087_266_462_599_716_48;
 
 /// Where a motion holds.
 #[derive(Debug)]
@@ -123,7 +126,7 @@ pub fn judge(
     let model = ClearanceModel::new(&resolved.cell);
     let planner = Planner::new(resolved, &model)
         .map_err(|error| RunError::Setup(SetupError::Robot(error)))?;
-    let holds = holds(resolved, &planner, &course, asked.goal.as_deref())?;
+    let holds = holds(resolved, &planner, &course, asked)?;
     let parts = parts(resolved, &course, &holds);
 
     let indices: Vec<usize> = holds.iter().map(|hold| hold.goal).collect();
@@ -188,6 +191,7 @@ pub fn judge(
         between: course.between_in_words(),
         duration_s: last,
         holds: reports,
+        program: None,
     };
     add_criteria(&mut run.report, &planner, &report);
     run.report.judged = Some(report);
@@ -237,8 +241,9 @@ fn holds(
     resolved: &ResolvedScenario,
     planner: &Planner<'_>,
     course: &Course<'_>,
-    named: Option<&str>,
+    asked: &JudgeOptions,
 ) -> Result<Vec<Hold>, Finding> {
+    let named = asked.goal.as_deref();
     let mut places = course.stands.clone();
     if places.last().is_none_or(|stand| stand.end < course.last()) {
         places.push(course.last()..course.last());
@@ -287,8 +292,13 @@ fn holds(
     let (at_goals, elsewhere): (Vec<Hold>, Vec<Hold>) =
         nearest.into_iter().partition(|hold| off(hold) <= 1.0);
     if at_goals.is_empty() {
-        let best = elsewhere.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+        let best = elsewhere
+            .into_iter()
+            .min_by(|a, b| off(a).total_cmp(&off(b)));
         let best = best.expect("every motion has an end");
+        if asked.nearest {
+            return Ok(vec![best]);
+        }
         let message = format!(
             "the motion stands at no goal: nearest to `{}`, {:.1} mm and {:.1} deg off it (t = {:.3} s)",
             resolved.goals[best.goal].name,

@@ -175,6 +175,17 @@ pub(crate) enum TcpArgument {
     GuideExit,
 }
 
+impl TcpArgument {
+    /// The tool's point that an installation has.
+    pub(super) fn installed(argument: Option<Self>) -> InstalledTcp {
+        match argument {
+            None => InstalledTcp::Unknown,
+            Some(Self::Flange) => InstalledTcp::Flange,
+            Some(Self::GuideExit) => InstalledTcp::GuideExit,
+        }
+    }
+}
+
 /// Reads the motion: a program by its name, else points.
 fn read(
     resolved: &ResolvedScenario,
@@ -206,12 +217,7 @@ fn read(
             return refuse(flag, "logs, and this is a program");
         }
     }
-    let installed = match arguments.tcp {
-        None => InstalledTcp::Unknown,
-        Some(TcpArgument::Flange) => InstalledTcp::Flange,
-        Some(TcpArgument::GuideExit) => InstalledTcp::GuideExit,
-    };
-    read_program(resolved, path, installed)
+    read_program(resolved, path, TcpArgument::installed(arguments.tcp))
 }
 
 /// Judges a motion from a file.
@@ -233,7 +239,7 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
         BetweenArgument::Lines => Between::Lines,
     });
     if arguments.free {
-        let report = judge_free(&resolved, &motion, between).map_err(failure)?;
+        let report = judge_free(&resolved, &motion, between).map_err(judge_failure)?;
         let junit = free_junit(&report);
         return told(
             arguments,
@@ -255,11 +261,12 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
         between,
         any_start: arguments.start == StartArgument::AsIs,
         beside: arguments.against == AgainstArgument::Plan,
+        nearest: false,
     };
     let progress = TerminalProgress::new(arguments.running.quiet);
     let done = judge_motion(&resolved, &motion, &asked, &options, &cancel, &progress);
     progress.finish();
-    let done = done.map_err(failure)?;
+    let done = done.map_err(judge_failure)?;
     let (status, report) = put(
         &done.resolved,
         &done.run,
@@ -291,7 +298,7 @@ fn answers(arguments: &JudgeArguments, resolved: &ResolvedScenario) -> Result<Ex
         tolerance: arguments.tolerance.unwrap_or(TOLERANCE),
         is_partial: arguments.partial,
     };
-    let report = judge_answers(resolved, &file, &options, &control).map_err(failure)?;
+    let report = judge_answers(resolved, &file, &options, &control).map_err(judge_failure)?;
     let text = answers_text(&report, arguments.running.wide);
     let junit = answers_junit(&report);
     told(arguments, &report, &text, report.verdict, junit)
@@ -318,7 +325,7 @@ fn told(
     Ok(ExitStatus::of(verdict))
 }
 
-fn failure(error: JudgeError) -> Failure {
+pub(super) fn judge_failure(error: JudgeError) -> Failure {
     match error {
         JudgeError::Refused(finding) => Failure::from(*finding),
         JudgeError::Run(error) => anyhow::Error::from(error).into(),

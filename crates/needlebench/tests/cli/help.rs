@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, Json, has_keys, holds, mujoco_is_ready};
 
-const COMMANDS: [&str; 25] = [
+const COMMANDS: [&str; 26] = [
     "init",
     "suggest",
     "run",
@@ -18,6 +18,7 @@ const COMMANDS: [&str; 25] = [
     "iso9283",
     "plan-excitation",
     "replay",
+    "robot",
     "needle",
     "breath",
     "pairs",

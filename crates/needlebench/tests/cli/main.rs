@@ -47,6 +47,7 @@ mod process;
 mod record_plan;
 mod referee;
 mod replay;
+mod robot;
 mod robust_io;
 mod run;
 mod schema;

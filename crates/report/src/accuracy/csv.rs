@@ -4,6 +4,8 @@ use std::fmt::Write;
 
 use needlebench_evaluation::accuracy::{AccuracyRow, AccuracyTable, QUANTITIES};
 
+use crate::csv::quoted;
+
 /// A row for each group and one for all, `p` in the last; empty where nothing was measured.
 pub(crate) fn accuracy_csv(table: &AccuracyTable) -> String {
     let mut header = vec!["group".to_owned(), "n".to_owned()];
@@ -53,13 +55,4 @@ fn write_row(out: &mut String, table: &AccuracyTable, row: &AccuracyRow, is_all:
     let radius = table.hit_radius.as_ref();
     let radius = radius.map_or(String::new(), |found| found.radius_mm.to_string());
     let _ = writeln!(out, ",{radius}");
-}
-
-/// A text of a cell (RFC 4180).
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
 }

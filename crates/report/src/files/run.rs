@@ -18,7 +18,7 @@ use super::folder::Folder;
 use super::iso9283::write_test;
 use super::pictures::{Pictures, remove_pictures};
 use crate::chart::press::press_chart;
-use crate::csv::{press_csv, recording_csv, recording_name, rtde_csv};
+use crate::csv::{events_csv, press_csv, recording_csv, recording_name, rtde_csv};
 use crate::junit::junit;
 use crate::markdown::markdown;
 use crate::page::run_page;
@@ -98,6 +98,14 @@ pub fn write_run(
     }
     if let (Some(run), Some(test)) = (&finished.excitation, &mut report.excitation) {
         test.files = write_logs(run, folder)?;
+    }
+    match report
+        .judged
+        .as_ref()
+        .and_then(|each| each.program.as_ref())
+    {
+        Some(program) => folder.write("events.csv", events_csv(program))?,
+        None => folder.remove("events.csv")?,
     }
     if wanted.page {
         progress.message("writing the page");

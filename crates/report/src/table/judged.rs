@@ -2,7 +2,7 @@
 
 use needlebench_cell::pair_in_words;
 use needlebench_evaluation::judged::{
-    HoldReport, JudgedReport, OwnPlanReport, PeakReport, SAME_CONFIGURATION,
+    HoldReport, JudgedReport, OwnPlanReport, PeakReport, ProgramReport, SAME_CONFIGURATION,
 };
 use needlebench_show::Block;
 
@@ -10,6 +10,9 @@ use super::class_words::class_in_words;
 
 /// Classes of clearance that a sentence names.
 const MOST_NAMED: usize = 2;
+
+/// Events of a program that a table has; all of them are in `events.csv`.
+const MOST_EVENTS: usize = 20;
 
 /// What is said of a judged motion: sentences, and a table of its clearances beside the plans'.
 pub fn judged_blocks(judged: &JudgedReport) -> Vec<Block> {
@@ -22,9 +25,42 @@ pub fn judged_blocks(judged: &JudgedReport) -> Vec<Block> {
         "motion {}: {}, {} points, {:.3} s{times}; interpolation: {}",
         judged.file, judged.format, judged.points, judged.duration_s, judged.between
     )])];
+    if let Some(program) = &judged.program {
+        blocks.extend(program_blocks(program));
+    }
     for hold in &judged.holds {
         blocks.push(Block::Lines(lines(hold)));
         blocks.extend(table(hold));
+    }
+    blocks
+}
+
+/// How a program went: a sentence, and a table of its events.
+fn program_blocks(program: &ProgramReport) -> Vec<Block> {
+    let mut blocks = vec![Block::Lines(vec![format!(
+        "{} (t = {:.3} s); run on a virtual controller at {:.0} Hz, with the arm in {}",
+        program.detail,
+        program.ended_s,
+        program.period_s.recip(),
+        program.engine
+    )])];
+    let header = ["time (s)", "line", "<event", "<what"];
+    let rows = program.events.iter().take(MOST_EVENTS).map(|event| {
+        vec![
+            format!("{:.3}", event.time_s),
+            event.line.map_or("-".to_owned(), |line| line.to_string()),
+            event.kind.replace('_', " "),
+            event.text.clone(),
+        ]
+    });
+    let rows: Vec<Vec<String>> = rows.collect();
+    let header = header.map(str::to_owned).to_vec();
+    if !rows.is_empty() {
+        blocks.push(Block::Table { header, rows });
+    }
+    let more = program.events.len().saturating_sub(MOST_EVENTS) + program.more_events;
+    if more > 0 {
+        blocks.push(Block::Lines(vec![format!("and {more} more events")]));
     }
     blocks
 }

@@ -285,6 +285,24 @@ impl ProgramArm {
     }
 }
 
+/// Joint positions within the limits that bring the flange to a pose in the controller's base frame: those whose largest
+/// difference from a posture is least.
+pub(crate) fn nearest_joints(
+    kinematics: &Kinematics,
+    limits: &JointLimits,
+    base_from_flange: &Pose,
+    near: &Joints,
+) -> Option<Joints> {
+    let base_link_from_flange = base_from_base_link() * base_from_flange;
+    let found = kinematics.branches(&base_link_from_flange, Some(near));
+    let within = found.solutions.iter().filter_map(|solution| {
+        let wrap = nearest_within_limits(&solution.joints, limits, near)?;
+        Some(wrap.joints)
+    });
+    let off = |joints: &Joints| (joints - near).amax();
+    within.min_by(|a, b| off(a).total_cmp(&off(b)))
+}
+
 fn check_posture(place: Place, joints: &Joints) -> Result<(), ScriptError> {
     let Some(joint) = joints.iter().position(|value| value.abs() > MOST_JOINT_RAD) else {
         return Ok(());
@@ -332,14 +350,7 @@ impl Arm for ProgramArm {
 
     fn inverse(&mut self, base_from_flange: &Pose, near: &Joints) -> Option<Joints> {
         self.assumed.insert(Assumed::Inverse);
-        let base_link_from_flange = base_from_base_link() * base_from_flange;
-        let found = self.kinematics.branches(&base_link_from_flange, Some(near));
-        let within = found.solutions.iter().filter_map(|solution| {
-            let wrap = nearest_within_limits(&solution.joints, &self.limits, near)?;
-            Some(wrap.joints)
-        });
-        let off = |joints: &Joints| (joints - near).amax();
-        within.min_by(|a, b| off(a).total_cmp(&off(b)))
+        nearest_joints(&self.kinematics, &self.limits, base_from_flange, near)
     }
 
     fn period_s(&self) -> f64 {

@@ -12,9 +12,10 @@ use needlebench_kinematics::ik::Kinematics;
 use needlebench_kinematics::{Pose, rotation_angle_between};
 use needlebench_recorded::{Known, MotionFile, MotionSource};
 use needlebench_scenario::ResolvedScenario;
-use needlebench_urscript::{Belief, Installation, Outcome, ScriptError, evaluate, parse};
+use needlebench_urscript::{Belief, Installation, ScriptError, evaluate, parse};
 
 use super::set_point_period_s;
+pub(crate) use arm::nearest_joints;
 use arm::{Assumed, ProgramArm};
 
 /// The tool's point of a controller's installation, which a program does not say.
@@ -55,22 +56,29 @@ pub fn read_program(
     installed: InstalledTcp,
 ) -> Result<MotionFile, Vec<Finding>> {
     let file = path.display().to_string();
-    let text = read_data_text(path).map_err(|error| {
+    let text = program_text(path).map_err(|finding| vec![finding])?;
+    program_motion(resolved, &file, &text, installed).map_err(|finding| vec![finding])
+}
+
+/// Text of a program.
+///
+/// # Errors
+/// That the file cannot be read.
+pub(crate) fn program_text(path: &Path) -> Result<String, Finding> {
+    read_data_text(path).map_err(|error| {
         let hint = error
             .hint("the path is relative to the working directory")
             .to_owned();
         let message = format!("cannot read the program: {error}");
-        vec![Finding::new(&file, message).hint(hint)]
-    })?;
-    program_motion(resolved, &file, &text, installed).map_err(|finding| vec![finding])
+        Finding::new(path.display().to_string(), message).hint(hint)
+    })
 }
 
-fn program_motion(
-    resolved: &ResolvedScenario,
-    file: &str,
-    text: &str,
-    installed: InstalledTcp,
-) -> Result<MotionFile, Finding> {
+/// Time between two set-points of the controller of a scenario's arm, s, and the arm's kinematics.
+///
+/// # Errors
+/// An arm without that time in its data, or that is no UR arm.
+pub(crate) fn controller_of(resolved: &ResolvedScenario) -> Result<(f64, Kinematics), Finding> {
     let Some(period_s) = set_point_period_s(resolved) else {
         let message = format!(
             "the data of {} do not say how often its controller takes set-points, which a program needs",
@@ -83,14 +91,31 @@ fn program_motion(
         let message = format!("programs are evaluated for UR arms alone: {error}");
         Finding::new(&resolved.source.file, message)
     })?;
+    Ok((period_s, kinematics.within(resolved.cell.robot.limits)))
+}
+
+impl InstalledTcp {
+    /// The tool's point in the flange's frame, if it is known.
+    pub(crate) fn flange_from_tcp(self, resolved: &ResolvedScenario) -> Option<Pose> {
+        match self {
+            Self::Unknown => None,
+            Self::Flange => Some(Pose::identity()),
+            Self::GuideExit => Some(resolved.cell.tool.flange_from_guide_exit),
+        }
+    }
+}
+
+fn program_motion(
+    resolved: &ResolvedScenario,
+    file: &str,
+    text: &str,
+    installed: InstalledTcp,
+) -> Result<MotionFile, Finding> {
+    let (period_s, kinematics) = controller_of(resolved)?;
     let limits = resolved.cell.robot.limits;
-    let flange_from_tcp = match installed {
-        InstalledTcp::Unknown => None,
-        InstalledTcp::Flange => Some(Pose::identity()),
-        InstalledTcp::GuideExit => Some(resolved.cell.tool.flange_from_guide_exit),
-    };
-    let mut arm = ProgramArm::new(&kinematics.within(limits), limits, period_s, resolved.start);
-    let wrong = |error: ScriptError| finding(file, text, error);
+    let flange_from_tcp = installed.flange_from_tcp(resolved);
+    let mut arm = ProgramArm::new(&kinematics, limits, period_s, resolved.start);
+    let wrong = |error: ScriptError| wrong_program(file, text, error);
     let program = parse(text).map_err(wrong)?;
     let outcome = evaluate(&program, &mut arm, &Installation { flange_from_tcp }).map_err(wrong)?;
     arm.finish().map_err(wrong)?;
@@ -107,7 +132,7 @@ fn program_motion(
             .iter()
             .map(|each: &Assumed| each.in_words().to_owned()),
     );
-    notes.extend(differences(resolved, &outcome, flange_from_tcp));
+    notes.extend(differences(resolved, &outcome.belief, flange_from_tcp));
     Ok(MotionFile {
         source: MotionSource {
             file: file.to_owned(),
@@ -124,7 +149,7 @@ fn program_motion(
 }
 
 /// An error of a program as one of its file.
-fn finding(file: &str, text: &str, error: ScriptError) -> Finding {
+pub(crate) fn wrong_program(file: &str, text: &str, error: ScriptError) -> Finding {
     let ScriptError {
         place,
         message,
@@ -143,9 +168,9 @@ fn finding(file: &str, text: &str, error: ScriptError) -> Finding {
 }
 
 /// What the program makes its controller believe, where that is not what the scenario has.
-fn differences(
+pub(crate) fn differences(
     resolved: &ResolvedScenario,
-    outcome: &Outcome,
+    belief: &Belief,
     installed: Option<Pose>,
 ) -> Vec<String> {
     let tool = &resolved.cell.tool;
@@ -154,7 +179,7 @@ fn differences(
         payload_kg,
         centre_m,
         gravity_m_s2,
-    } = &outcome.belief;
+    } = belief;
     let mut notes = Vec::new();
     let carried = tool.body.mass_kg;
     match payload_kg {
