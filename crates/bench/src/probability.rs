@@ -30,6 +30,9 @@ const POINT_M: f64 = 2e-3;
 const BESIDE_M: f64 = 12e-3;
 const BEHIND_M: f64 = 30e-3;
 
+/// Farther off its goal an arm holds its needle too far from what was looked at beside it, m.
+const HELD_M: f64 = 5e-3;
+
 /// Standard deviations of boundaries that they are taken to be nearer by: none is by more (6e-16).
 const FAR: f64 = 8.0;
 
@@ -278,6 +281,14 @@ impl<'a> Surroundings<'a> {
     /// # Errors
     /// A sentence.
     fn of(&self, case: &BudgetCase<'_>, draws: &Draws) -> Result<ProbabilityReport, String> {
+        let off_m = case.held_off_m.map(|off_m| off_m.norm());
+        if let Some(off_m) = off_m.into_iter().find(|off_m| *off_m > HELD_M) {
+            return Err(format!(
+                "the needle is held {:.1} mm off the goal's: only up to {:.0} mm the structures beside it are known",
+                off_m * 1e3,
+                HELD_M * 1e3
+            ));
+        }
         let law = path_law(case).map_err(|error| error.to_string())?;
         let about = Case::new(&law, self.needle, &self.structures, &self.around)
             .map_err(|error| error.to_string())?;

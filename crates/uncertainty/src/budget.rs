@@ -39,7 +39,13 @@ pub struct BudgetCase<'a> {
     pub trajectory: &'a JointTrajectory,
     /// Step of the servo, s.
     pub timestep_s: f64,
+    /// How far the arm is commanded to hold the needle off where the goal wants it, at the depths of skin and target, world, m:
+    /// see [`Self::as_held`].
+    pub held_off_m: [Vector3<f64>; 2],
 }
+
+/// What the inverse kinematics leaves of a pose is less, m.
+const HELD_M: f64 = 1e-9;
 
 impl<'a> BudgetCase<'a> {
     /// Of a scenario's cell, its patient where it is planned, and its step.
@@ -59,6 +65,36 @@ impl<'a> BudgetCase<'a> {
             imperfections,
             trajectory,
             timestep_s: resolved.scenario.engines.timestep_ms * 1e-3,
+            held_off_m: [Vector3::zeros(); 2],
+        }
+    }
+
+    /// The same where the motion may end beside the goal, as one of another planner does: what it is off by is a bias of all
+    /// sources together, and of no source alone.
+    pub fn as_held(self) -> Self {
+        let goal = self.goal.world_from_guide_exit;
+        let planned = self
+            .depths_m()
+            .map(|depth_m| goal * Point3::new(0.0, 0.0, depth_m));
+        let held = self.planned();
+        let off_m = [0, 1].map(|index| held[index] - planned[index]);
+        Self {
+            held_off_m: off_m.map(|off_m| {
+                if off_m.norm() > HELD_M {
+                    off_m
+                } else {
+                    Vector3::zeros()
+                }
+            }),
+            ..self
+        }
+    }
+
+    /// Of a part of what is off alone.
+    fn of_a_part(self) -> Self {
+        Self {
+            held_off_m: [Vector3::zeros(); 2],
+            ..self
         }
     }
 }
@@ -314,10 +350,11 @@ pub fn budget(
 ) -> Result<ErrorBudget, BudgetError> {
     let bends = case.bends()?;
     let bends = bends.as_ref();
+    let part = case.of_a_part();
     let sources = Source::ALL
         .into_iter()
         .filter(|source| source.is_in(case.imperfections))
-        .map(|source| source_budget(case, Some(source), bends, samples.each_source, seed))
+        .map(|source| source_budget(&part, Some(source), bends, samples.each_source, seed))
         .collect::<Result<Vec<_>, _>>()?;
     let dominant = sources
         .iter()
@@ -328,7 +365,7 @@ pub fn budget(
         .and_then(|each| each.source);
     let of_stage = |stage: Stage| -> Result<Option<Moments>, BudgetError> {
         let all = only(case.imperfections, |source| source.stage() == stage);
-        let [_, at_target] = analytic::moments(case, &all, bends)?;
+        let [_, at_target] = analytic::moments(&part, &all, bends)?;
         Ok(Some(at_target))
     };
     Ok(ErrorBudget {

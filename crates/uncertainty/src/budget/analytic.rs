@@ -81,7 +81,7 @@ pub(super) fn errors(
             bend: bends.map(|bends| bends.at(index, |across| roll_0 * across)),
         };
         let displaced = |errors: &Joints| mean_displacement(case, &truth, &target, errors, point);
-        let mut bias = displaced(&joints.bias);
+        let mut bias = displaced(&joints.bias) + case.held_off_m[index];
         for deviation in joints.principal_deviations() {
             let [ahead, behind] =
                 [1.0, -1.0].map(|sign| displaced(&(joints.bias + deviation * sign)));

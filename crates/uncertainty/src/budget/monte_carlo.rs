@@ -63,8 +63,9 @@ pub(super) fn moments(
         let position = settled.position + trembling;
         let needle = truth.needle_points(case.cell, &position, depths_m);
         let wanted = truth.wanted(case.goal, &planned);
-        for ((errors, needle), wanted) in errors.iter_mut().zip(needle).zip(wanted) {
-            errors.push(from_world * (needle - wanted));
+        let off_m = case.held_off_m.iter().zip(needle).zip(wanted);
+        for (errors, ((held_off_m, needle), wanted)) in errors.iter_mut().zip(off_m) {
+            errors.push(from_world * (needle - wanted + held_off_m));
         }
     }
     let count = samples as f64;

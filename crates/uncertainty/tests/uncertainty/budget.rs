@@ -1,7 +1,9 @@
 //! The two ways to the error budget agree.
 
 use crate::common::{ALL, POSTURES, imperfect, motion_to, servo};
+use nalgebra::{Translation3, Vector3};
 use needlebench_kinematics::Chain;
+use needlebench_scenario::Goal;
 use needlebench_scenario::imperfections::ArmPopulation;
 use needlebench_uncertainty::Source;
 use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, Samples, SourceBudget, budget};
@@ -36,6 +38,7 @@ fn budgets(blocks: &str, samples: usize) -> Vec<ErrorBudget> {
                 imperfections: resolved.imperfections.as_ref().expect("given"),
                 trajectory: &trajectory,
                 timestep_s: 1e-3,
+                held_off_m: [Vector3::zeros(); 2],
             };
             let samples = Samples {
                 total: samples,
@@ -44,6 +47,49 @@ fn budgets(blocks: &str, samples: usize) -> Vec<ErrorBudget> {
             budget(&case, samples, 5).expect("the markers are sound and the drives strong enough")
         })
         .collect()
+}
+
+/// A motion of somebody else ends beside its goal: the mean square of all grows by the square of that and by twice its product
+/// with the bias, by Jacobians and by draws; sources alone stay as they are.
+#[test]
+fn where_the_arm_is_held_beside_its_goal_is_a_bias_of_all() {
+    let resolved = imperfect(ALL);
+    let servo = servo(&resolved);
+    let trajectory = motion_to(&resolved, POSTURES[0], 0.1);
+    let mut goal = resolved.goals[0].clone();
+    goal.world_from_guide_exit = resolved.cell.robot.world_from_flange(&trajectory.end())
+        * resolved.cell.tool.flange_from_guide_exit;
+    let at_goal = |goal: &Goal| {
+        let imperfections = resolved.imperfections.as_ref().unwrap();
+        let case = BudgetCase::of(&resolved, goal, &servo, imperfections, &trajectory).as_held();
+        let samples = Samples {
+            total: 400,
+            each_source: 0,
+        };
+        budget(&case, samples, 5).unwrap()
+    };
+    let held = at_goal(&goal);
+    let off_m = Vector3::new(3e-3, -2e-3, 1e-3);
+    goal.world_from_guide_exit *= Translation3::from(-off_m);
+    let beside = at_goal(&goal);
+    assert_eq!(held.sources, beside.sources);
+    let both = [
+        (&held.total.at_skin, &beside.total.at_skin),
+        (&held.total.at_target, &beside.total.at_target),
+    ];
+    for (held, beside) in both {
+        let drawn = [held, beside].map(|point| point.monte_carlo.unwrap());
+        for [held, beside] in [[held.analytic, beside.analytic], drawn] {
+            let expected = held.rms_m * held.rms_m
+                + 2.0 * Vector3::from(held.bias_m).dot(&off_m)
+                + off_m.norm_squared();
+            let found = beside.rms_m * beside.rms_m;
+            assert!(
+                (found - expected).abs() < 1e-6 * expected,
+                "{found} and {expected}"
+            );
+        }
+    }
 }
 
 #[test]
