@@ -288,6 +288,7 @@ def check_script(folder: pathlib.Path, about: dict, quintic, nominal_arm: str) -
             clock = last["end_s"]
         else:
             assert move.period_s == period, "the controller's own period"
+            assert move.settle_s == 0.5, "the arm catches up"
             end = clock + move.duration_s
             for time in np.linspace(clock, end, 1201):
                 apart = guide(move.at_time(time - clock)) - guide(quintic(time))

@@ -7,7 +7,7 @@ It knows what the exported programs use and refuses everything else: functions w
 - `movej(q, a=, v=)` by the trapezoid of the leading joint that the manual describes: the joint with the longest
   way has speed `v` and acceleration `a`, the others move along with it, without blending.
 - `servoj(q, 0, 0, t, lookahead, gain)`: the joints are at `q` after `t`, straight from where they were: the path of
-  the set-points, not the lag of a real arm behind them.
+  the set-points, not the lag of a real arm behind them. The last set-point, for longer, holds it.
 - `stopj(a)`, which has to find the arm at rest or as slow as the last two set-points.
 - `set_tcp`, `set_payload`, `popup`, `halt`, `get_actual_joint_positions`, `norm`, `sleep`.
 
@@ -245,6 +245,7 @@ class Move:
     acceleration_rad_s2: float = 0.0
     set_points: list = field(default_factory=list)
     period_s: float = 0.0
+    settle_s: float = 0.0
 
     def at_share(self, share: float) -> np.ndarray:
         """Of a `movej` where the leading joint has done this share of its way."""
@@ -388,6 +389,10 @@ class Controller:
             raise ScriptError("lookahead_time or gain outside of what the manual allows")
         end = np.asarray(q, float)
         last = self.moves[-1] if self.moves else None
+        if last is not None and last.kind == "servoj" and t > last.period_s and np.array_equal(end, last.end):
+            # The last set-point is held, for the arm to catch up.
+            last.settle_s += t
+            return
         if last is None or last.kind != "servoj" or last.end is not self.q:
             last = Move("servoj", self.q, end, 0.0, period_s=t)
             self.moves.append(last)
