@@ -4,7 +4,6 @@ pub mod answers;
 mod course;
 pub mod free;
 mod peaks;
-mod program;
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -32,9 +31,6 @@ use crate::setup::SetupError;
 
 use course::Course;
 use peaks::{peaks, results};
-
-pub use program::{InstalledTcp, is_program, read_program};
-pub(crate) use program::{controller_of, differences, nearest_joints, program_text, wrong_program};
 
 /// How a motion is judged.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -208,7 +204,7 @@ pub fn judge(
 }
 
 /// Time between two set-points of the arm's controller, s; none where the arm's data do not say it.
-fn set_point_period_s(resolved: &ResolvedScenario) -> Option<f64> {
+pub(crate) fn set_point_period_s(resolved: &ResolvedScenario) -> Option<f64> {
     let used = resolved.robot_description.arm.as_ref()?;
     Some(used.arm.data.control.as_ref()?.period_ms * 1e-3)
 }

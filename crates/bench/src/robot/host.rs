@@ -7,13 +7,13 @@ use needlebench_controller::{
     ArmData, Command, Controller, Event, Goal, Move, Origin, Request, State,
 };
 use needlebench_engine::PlantState;
-use needlebench_kinematics::{Joints, Pose, base_from_base_link};
+use needlebench_kinematics::ik::{Kinematics, nearest_within_limits};
+use needlebench_kinematics::{JointLimits, Joints, Pose, base_from_base_link};
 use needlebench_urscript::{
     ArmState, Bank, Belief, End, Host, Message, Place, Request as Wish, ScriptError, Signal,
 };
 
 use super::log::Log;
-use crate::judge::nearest_joints;
 
 /// A joint stands within this of its set-point, rad, and below this speed, rad/s.
 const SETTLED_RAD: f64 = 1e-3;
@@ -164,6 +164,24 @@ impl RobotHost {
         }
         end
     }
+}
+
+/// Joint positions within the limits that bring the flange to a pose in the controller's base frame: those whose largest
+/// difference from a posture is least.
+fn nearest_joints(
+    kinematics: &Kinematics,
+    limits: &JointLimits,
+    base_from_flange: &Pose,
+    near: &Joints,
+) -> Option<Joints> {
+    let base_link_from_flange = base_from_base_link() * base_from_flange;
+    let found = kinematics.branches(&base_link_from_flange, Some(near));
+    let within = found.solutions.iter().filter_map(|solution| {
+        let wrap = nearest_within_limits(&solution.joints, limits, near)?;
+        Some(wrap.joints)
+    });
+    let off = |joints: &Joints| (joints - near).amax();
+    within.min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
 impl Host for RobotHost {

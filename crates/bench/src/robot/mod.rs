@@ -4,6 +4,7 @@
 mod host;
 mod live;
 mod log;
+mod program;
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -25,13 +26,13 @@ use needlebench_scenario::ResolvedScenario;
 use needlebench_urscript::Program;
 
 use self::live::{Bounds, Ran, run_program};
-use crate::judge::{
-    AT_GOAL_M, AT_GOAL_RAD, InstalledTcp, JudgeError, JudgeOptions, JudgedRun, controller_of,
-    differences, judge, program_text, wrong_program,
-};
+use self::program::{controller_of, differences, program_text, wrong_program};
+use crate::judge::{AT_GOAL_M, AT_GOAL_RAD, JudgeError, JudgeOptions, JudgedRun, judge};
 use crate::run::leave_open;
 use crate::scenario_run::RunOptions;
 use crate::setup::Setup;
+
+pub use self::program::{InstalledTcp, is_program};
 
 /// Longest time that a program is run for, s, unless it is asked otherwise.
 pub const TIME_LIMIT_S: f64 = 300.0;
@@ -119,23 +120,76 @@ pub fn judge_program(
     cancel: &AtomicBool,
     progress: &dyn Progress,
 ) -> Result<JudgedRun, RobotError> {
-    let file = path.display().to_string();
-    let text = program_text(path)?;
-    let program = Program::load(&text).map_err(|error| wrong_program(&file, &text, error))?;
+    progress.message("running the program");
+    let model = ClearanceModel::new(&resolved.cell);
+    let engine = first_engine(resolved, options)?;
+    let (motion, ran) = run_file((resolved, &model), path, asked, engine, cancel)?;
+    let judging = JudgeOptions {
+        goal: asked.goal.clone(),
+        beside: asked.beside,
+        nearest: true,
+        ..JudgeOptions::default()
+    };
+    let mut judged = judge(resolved, &motion, &judging, options, cancel, progress)?;
+    add_program(&mut judged, &model, engine, ran);
+    Ok(judged)
+}
+
+/// The motion of a program, as [`judge_program`] runs it, to be judged by itself.
+///
+/// # Errors
+/// [`RobotError`], and how a program ended that did not come to its end.
+pub fn program_motion(
+    resolved: &ResolvedScenario,
+    path: &Path,
+    asked: &RobotOptions,
+    options: &RunOptions,
+    cancel: &AtomicBool,
+) -> Result<MotionFile, RobotError> {
+    let model = ClearanceModel::new(&resolved.cell);
+    let engine = first_engine(resolved, options)?;
+    let (motion, ran) = run_file((resolved, &model), path, asked, engine, cancel)?;
+    if ran.0.end.is_regular() == Some(true) {
+        return Ok(motion);
+    }
+    let finding = Finding::new(path.display().to_string(), ran.0.detail);
+    Err(finding
+        .hint("`needlebench robot` judges what a program did before")
+        .into())
+}
+
+/// The engine in which a program moves an arm.
+///
+/// # Errors
+/// Engines that are not there, or none.
+fn first_engine(
+    resolved: &ResolvedScenario,
+    options: &RunOptions,
+) -> Result<&'static dyn Engine, RobotError> {
     let engines = options
         .chosen_engines(resolved)
         .map_err(|error| JudgeError::Run(error.into()))?;
-    let Some(engine) = engines.first().copied() else {
+    engines.first().copied().ok_or_else(|| {
         let finding = Finding::new(&resolved.source.file, "no engine is chosen");
-        return Err(finding.key("engines.run").into());
-    };
-    progress.message("running the program");
-    let model = ClearanceModel::new(&resolved.cell);
-    let setup = Setup::new(resolved, &model).map_err(|error| JudgeError::Run(error.into()))?;
+        finding.key("engines.run").into()
+    })
+}
+
+/// Runs the program of a file: its set-points as a motion, what it left, and how long it took.
+fn run_file(
+    (resolved, model): (&ResolvedScenario, &ClearanceModel),
+    path: &Path,
+    asked: &RobotOptions,
+    engine: &'static dyn Engine,
+    cancel: &AtomicBool,
+) -> Result<(MotionFile, (Ran, Duration)), RobotError> {
+    let file = path.display().to_string();
+    let text = program_text(path)?;
+    let program = Program::load(&text).map_err(|error| wrong_program(&file, &text, error))?;
+    let setup = Setup::new(resolved, model).map_err(|error| JudgeError::Run(error.into()))?;
     let started = Instant::now();
     let ran = run_in(&setup, program, engine, asked, cancel, Keep::Near(&[]))?.0;
     let took = started.elapsed();
-
     let period_s = ran.set_points.period_s();
     let mut notes = assumptions(engine);
     notes.extend(differences(
@@ -157,15 +211,7 @@ pub fn judge_program(
         lines: ran.lines.clone(),
         notes,
     };
-    let judging = JudgeOptions {
-        goal: asked.goal.clone(),
-        beside: asked.beside,
-        nearest: true,
-        ..JudgeOptions::default()
-    };
-    let mut judged = judge(resolved, &motion, &judging, options, cancel, progress)?;
-    add_program(&mut judged, &model, engine, (ran, took));
-    Ok(judged)
+    Ok((motion, (ran, took)))
 }
 
 /// Runs a program in an engine; with the arm's recording, as far as it is kept.
@@ -181,7 +227,7 @@ fn run_in<'k>(
     let (period_s, kinematics) = controller_of(resolved)?;
     let settings = resolved.scenario.engines.settings();
     let steps = steps(resolved, period_s, settings.timestep_s)?;
-    let arm = arm(resolved, period_s, kinematics);
+    let arm = arm(resolved, period_s, &kinematics);
     let is_at_goal = |joints: &Joints| {
         resolved.goals.iter().any(|goal| {
             let held = setup.planner.held(goal, joints);
@@ -246,9 +292,9 @@ fn steps(resolved: &ResolvedScenario, period_s: f64, timestep_s: f64) -> Result<
     Err(finding.hint("choose a step that the cycle is a multiple of, such as 1 ms"))
 }
 
-fn arm(resolved: &ResolvedScenario, period_s: f64, kinematics: Kinematics) -> ArmData {
+fn arm(resolved: &ResolvedScenario, period_s: f64, kinematics: &Kinematics) -> ArmData {
     ArmData {
-        kinematics,
+        kinematics: *kinematics,
         limits: resolved.cell.robot.limits,
         acceleration_rad_s2: Joints::repeat(ACCELERATION_RAD_S2),
         period_s,

@@ -179,7 +179,7 @@ const DIFFERENCE: f64 = 1e-8;
 fn the_tools_speed_is_the_change_of_its_pose() {
     let resolved = resolved("robot/biopsy.toml");
     let (period_s, kinematics) = controller_of(&resolved).unwrap();
-    let arm = arm(&resolved, period_s, kinematics);
+    let arm = arm(&resolved, period_s, &kinematics);
     let tcp = Pose::new(
         nalgebra::Vector3::new(0.02, -0.03, 0.12),
         nalgebra::Vector3::new(0.3, 0.1, -0.2),

@@ -1,13 +1,16 @@
 //! `needlebench judge`.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use needlebench_bench::RunOptions;
 use needlebench_bench::judge::answers::{AnswersOptions, TOLERANCE, judge_answers};
 use needlebench_bench::judge::free::judge_free;
-use needlebench_bench::judge::{
-    InstalledTcp, JudgeError, JudgeOptions, is_program, judge as judge_motion, read_program,
+use needlebench_bench::judge::{JudgeError, JudgeOptions, JudgedRun, judge as judge_motion};
+use needlebench_bench::robot::{
+    InstalledTcp, RobotOptions, TIME_LIMIT_S, Until, is_program, judge_program, program_motion,
 };
 use needlebench_evaluation::report::Verdict;
 use needlebench_input::Finding;
@@ -22,6 +25,7 @@ use needlebench_scenario::ResolvedScenario;
 use serde::Serialize;
 
 use super::results_folder::{ResultsFolder, probe_file};
+use super::robot::robot_failure;
 use super::run::{Outputs, put, tell_pipeline};
 use super::{load, overrides, print_json, print_text};
 use crate::arguments::{RobotArguments, RunningArguments};
@@ -37,9 +41,8 @@ for the time and one for each joint (what `export --as trajectory` writes in JSO
 UR's RTDE recorder or of ur_rtde (its set-points), or an MCAP file. Joints are found by name, in any order; angles are \
 in radians. Points without times get them from the limits of the scenario's [motion], with a stop at each.
 
-A program in URScript (.script) begins at the scenario's start posture. Its moves with fixed arguments are judged: \
-movej, movel, movep, movec, servoj, with the controller's ramps and blends as assumed in the report's notes. What \
-depends on the arm's measured state, inputs, sockets or threads is refused with its line.
+A program in URScript (.script) runs on a virtual controller, from the scenario's start posture on, as by `robot \
+--script`, which has more options; the verdict is the same.
 
 The goal is the one at which the guide stands, within 20 mm and 5 degrees; the configuration the one of the eight whose \
 solution is nearest. Several holds of one motion are judged in their order. Judged are the criteria of a run, and \
@@ -186,38 +189,49 @@ impl TcpArgument {
     }
 }
 
-/// Reads the motion: a program by its name, else points.
-fn read(
-    resolved: &ResolvedScenario,
-    path: &Path,
-    arguments: &JudgeArguments,
-) -> Result<MotionFile, Vec<Finding>> {
-    let refuse = |flag: &str, about: &str| {
-        let message = format!("{flag} is about {about}");
-        let finding = Finding::new(path.display().to_string(), message).key(flag);
-        Err(vec![finding.hint("leave it out")])
-    };
-    if !is_program(path) {
-        if arguments.tcp.is_some() {
-            return refuse("--tcp", "programs, and this is none");
-        }
-        let options = MotionOptions {
-            of_actual: arguments.of == OfArgument::Actual,
-            stretch: arguments.stretch.map(|number| number as usize),
-            topic: arguments.topic.clone(),
-        };
-        return read_motion(path, &options);
+/// Refuses a flag that the motion's file makes no sense of.
+fn refused(path: &Path, flag: &str, about: &str) -> Failure {
+    let message = format!("{flag} is about {about}");
+    let finding = Finding::new(path.display().to_string(), message).key(flag);
+    Failure::from(finding.hint("leave it out"))
+}
+
+/// Reads a motion that is no program.
+fn read(path: &Path, arguments: &JudgeArguments) -> Result<MotionFile, Failure> {
+    if arguments.tcp.is_some() {
+        return Err(refused(path, "--tcp", "programs, and this is none"));
     }
-    for (is_given, flag) in [
-        (arguments.of == OfArgument::Actual, "--of"),
-        (arguments.stretch.is_some(), "--stretch"),
-        (arguments.topic.is_some(), "--topic"),
+    let options = MotionOptions {
+        of_actual: arguments.of == OfArgument::Actual,
+        stretch: arguments.stretch.map(|number| number as usize),
+        topic: arguments.topic.clone(),
+    };
+    Ok(read_motion(path, &options)?)
+}
+
+/// How a program is run.
+fn program_options(path: &Path, arguments: &JudgeArguments) -> Result<RobotOptions, Failure> {
+    for (is_given, flag, about) in [
+        (arguments.of == OfArgument::Actual, "--of", "logs"),
+        (arguments.stretch.is_some(), "--stretch", "logs"),
+        (arguments.topic.is_some(), "--topic", "logs"),
+        (arguments.between.is_some(), "--between", "points"),
     ] {
         if is_given {
-            return refuse(flag, "logs, and this is a program");
+            return Err(refused(
+                path,
+                flag,
+                &format!("{about}, and this is a program"),
+            ));
         }
     }
-    read_program(resolved, path, TcpArgument::installed(arguments.tcp))
+    Ok(RobotOptions {
+        until: Until::Program,
+        time_limit_s: TIME_LIMIT_S,
+        installed: TcpArgument::installed(arguments.tcp),
+        goal: arguments.goal.clone(),
+        beside: arguments.against == AgainstArgument::Plan,
+    })
 }
 
 /// Judges a motion from a file.
@@ -232,22 +246,8 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
     let Some(motion) = &arguments.motion else {
         return answers(arguments, &resolved);
     };
-    let motion = read(&resolved, motion, arguments)?;
-    let between = arguments.between.map(|between| match between {
-        BetweenArgument::Quintics => Between::Quintics,
-        BetweenArgument::Cubics => Between::Cubics,
-        BetweenArgument::Lines => Between::Lines,
-    });
     if arguments.free {
-        let report = judge_free(&resolved, &motion, between).map_err(judge_failure)?;
-        let junit = free_junit(&report);
-        return told(
-            arguments,
-            &report,
-            &free_text(&report),
-            report.verdict,
-            junit,
-        );
+        return free(arguments, &resolved, motion);
     }
     let folder = arguments.running.out.join(&resolved.scenario.name);
     let _taken = ResultsFolder::take(&folder)?;
@@ -256,17 +256,10 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
     }
     let cancel = watch_interrupts()?;
     let options = arguments.running.options();
-    let asked = JudgeOptions {
-        goal: arguments.goal.clone(),
-        between,
-        any_start: arguments.start == StartArgument::AsIs,
-        beside: arguments.against == AgainstArgument::Plan,
-        nearest: false,
-    };
     let progress = TerminalProgress::new(arguments.running.quiet);
-    let done = judge_motion(&resolved, &motion, &asked, &options, &cancel, &progress);
+    let done = judged(arguments, (&resolved, motion), &options, &cancel, &progress);
     progress.finish();
-    let done = done.map_err(judge_failure)?;
+    let done = done?;
     let (status, report) = put(
         &done.resolved,
         &done.run,
@@ -281,6 +274,59 @@ pub(crate) fn judge(arguments: &JudgeArguments) -> Result<ExitStatus, Failure> {
     }
     tell_pipeline(&[&report], arguments.running.junit.as_deref())?;
     Ok(status)
+}
+
+/// Judges a program as `robot` does, any other motion by its points.
+fn judged(
+    arguments: &JudgeArguments,
+    (resolved, path): (&ResolvedScenario, &Path),
+    options: &RunOptions,
+    cancel: &AtomicBool,
+    progress: &TerminalProgress,
+) -> Result<JudgedRun, Failure> {
+    if is_program(path) {
+        let asked = program_options(path, arguments)?;
+        let done = judge_program(resolved, path, &asked, options, cancel, progress);
+        return done.map_err(robot_failure);
+    }
+    let motion = read(path, arguments)?;
+    let asked = JudgeOptions {
+        goal: arguments.goal.clone(),
+        between: between(arguments),
+        any_start: arguments.start == StartArgument::AsIs,
+        beside: arguments.against == AgainstArgument::Plan,
+        nearest: false,
+    };
+    let done = judge_motion(resolved, &motion, &asked, options, cancel, progress);
+    done.map_err(judge_failure)
+}
+
+/// Judges clearances and joints alone.
+fn free(
+    arguments: &JudgeArguments,
+    resolved: &ResolvedScenario,
+    path: &Path,
+) -> Result<ExitStatus, Failure> {
+    let motion = if is_program(path) {
+        let asked = program_options(path, arguments)?;
+        let cancel = watch_interrupts()?;
+        let options = arguments.running.options();
+        program_motion(resolved, path, &asked, &options, &cancel).map_err(robot_failure)?
+    } else {
+        read(path, arguments)?
+    };
+    let report = judge_free(resolved, &motion, between(arguments)).map_err(judge_failure)?;
+    let junit = free_junit(&report);
+    let text = free_text(&report);
+    told(arguments, &report, &text, report.verdict, junit)
+}
+
+fn between(arguments: &JudgeArguments) -> Option<Between> {
+    arguments.between.map(|between| match between {
+        BetweenArgument::Quintics => Between::Quintics,
+        BetweenArgument::Cubics => Between::Cubics,
+        BetweenArgument::Lines => Between::Lines,
+    })
 }
 
 /// Judges the answers of a solver.

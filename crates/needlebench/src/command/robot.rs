@@ -100,7 +100,7 @@ pub(crate) fn robot(arguments: &RobotCommandArguments) -> Result<ExitStatus, Fai
     let script = &arguments.script;
     let done = judge_program(&resolved, script, &asked, &options, &cancel, &progress);
     progress.finish();
-    let done = done.map_err(failure)?;
+    let done = done.map_err(robot_failure)?;
     let (status, report) = put(
         &done.resolved,
         &done.run,
@@ -117,7 +117,7 @@ pub(crate) fn robot(arguments: &RobotCommandArguments) -> Result<ExitStatus, Fai
     Ok(status)
 }
 
-fn failure(error: RobotError) -> Failure {
+pub(super) fn robot_failure(error: RobotError) -> Failure {
     match error {
         RobotError::Judge(error) => judge_failure(error),
         error @ RobotError::Engine { .. } => anyhow::Error::from(error).into(),

@@ -1,22 +1,14 @@
-//! Programs of the controller as motions: URScript whose arguments are fixed.
-
-mod arm;
-mod chain;
-mod leg;
-mod stream;
+//! Files with programs, what their controller is, and what it is made to believe.
 
 use std::path::Path;
 
-use needlebench_input::{Finding, read_data_text, sha256_hex};
+use needlebench_input::{Finding, read_data_text};
 use needlebench_kinematics::ik::Kinematics;
 use needlebench_kinematics::{Pose, rotation_angle_between};
-use needlebench_recorded::{Known, MotionFile, MotionSource};
 use needlebench_scenario::ResolvedScenario;
-use needlebench_urscript::{Belief, Installation, ScriptError, evaluate, parse};
+use needlebench_urscript::{Belief, ScriptError};
 
-use super::set_point_period_s;
-pub(crate) use arm::nearest_joints;
-use arm::{Assumed, ProgramArm};
+use crate::judge::set_point_period_s;
 
 /// The tool's point of a controller's installation, which a program does not say.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -46,25 +38,11 @@ pub fn is_program(path: &Path) -> bool {
     })
 }
 
-/// Reads a program, evaluates it, and makes set-points of its motions, from the scenario's start posture on.
-///
-/// # Errors
-/// What is wrong with the program, or depends on more than fixed arguments, with its line and column.
-pub fn read_program(
-    resolved: &ResolvedScenario,
-    path: &Path,
-    installed: InstalledTcp,
-) -> Result<MotionFile, Vec<Finding>> {
-    let file = path.display().to_string();
-    let text = program_text(path).map_err(|finding| vec![finding])?;
-    program_motion(resolved, &file, &text, installed).map_err(|finding| vec![finding])
-}
-
 /// Text of a program.
 ///
 /// # Errors
 /// That the file cannot be read.
-pub(crate) fn program_text(path: &Path) -> Result<String, Finding> {
+pub(super) fn program_text(path: &Path) -> Result<String, Finding> {
     read_data_text(path).map_err(|error| {
         let hint = error
             .hint("the path is relative to the working directory")
@@ -78,7 +56,7 @@ pub(crate) fn program_text(path: &Path) -> Result<String, Finding> {
 ///
 /// # Errors
 /// An arm without that time in its data, or that is no UR arm.
-pub(crate) fn controller_of(resolved: &ResolvedScenario) -> Result<(f64, Kinematics), Finding> {
+pub(super) fn controller_of(resolved: &ResolvedScenario) -> Result<(f64, Kinematics), Finding> {
     let Some(period_s) = set_point_period_s(resolved) else {
         let message = format!(
             "the data of {} do not say how often its controller takes set-points, which a program needs",
@@ -96,7 +74,7 @@ pub(crate) fn controller_of(resolved: &ResolvedScenario) -> Result<(f64, Kinemat
 
 impl InstalledTcp {
     /// The tool's point in the flange's frame, if it is known.
-    pub(crate) fn flange_from_tcp(self, resolved: &ResolvedScenario) -> Option<Pose> {
+    pub(super) fn flange_from_tcp(self, resolved: &ResolvedScenario) -> Option<Pose> {
         match self {
             Self::Unknown => None,
             Self::Flange => Some(Pose::identity()),
@@ -105,51 +83,8 @@ impl InstalledTcp {
     }
 }
 
-fn program_motion(
-    resolved: &ResolvedScenario,
-    file: &str,
-    text: &str,
-    installed: InstalledTcp,
-) -> Result<MotionFile, Finding> {
-    let (period_s, kinematics) = controller_of(resolved)?;
-    let limits = resolved.cell.robot.limits;
-    let flange_from_tcp = installed.flange_from_tcp(resolved);
-    let mut arm = ProgramArm::new(&kinematics, limits, period_s, resolved.start);
-    let wrong = |error: ScriptError| wrong_program(file, text, error);
-    let program = parse(text).map_err(wrong)?;
-    let outcome = evaluate(&program, &mut arm, &Installation { flange_from_tcp }).map_err(wrong)?;
-    arm.finish().map_err(wrong)?;
-    if arm.states.len() < 2 {
-        let message = format!(
-            "the program moves nothing from the start posture, {} motions were evaluated",
-            outcome.motions
-        );
-        return Err(Finding::new(file, message).hint("a motion has at least one move"));
-    }
-    let mut notes = outcome.notes.clone();
-    notes.extend(
-        arm.assumed
-            .iter()
-            .map(|each: &Assumed| each.in_words().to_owned()),
-    );
-    notes.extend(differences(resolved, &outcome.belief, flange_from_tcp));
-    Ok(MotionFile {
-        source: MotionSource {
-            file: file.to_owned(),
-            sha256: sha256_hex(text.as_bytes()),
-            format: "URScript program",
-            points: arm.states.len(),
-        },
-        times_s: Some(arm.times_s),
-        states: arm.states,
-        known: Known::Accelerations,
-        lines: arm.lines,
-        notes,
-    })
-}
-
 /// An error of a program as one of its file.
-pub(crate) fn wrong_program(file: &str, text: &str, error: ScriptError) -> Finding {
+pub(super) fn wrong_program(file: &str, text: &str, error: ScriptError) -> Finding {
     let ScriptError {
         place,
         message,
@@ -168,7 +103,7 @@ pub(crate) fn wrong_program(file: &str, text: &str, error: ScriptError) -> Findi
 }
 
 /// What the program makes its controller believe, where that is not what the scenario has.
-pub(crate) fn differences(
+pub(super) fn differences(
     resolved: &ResolvedScenario,
     belief: &Belief,
     installed: Option<Pose>,
@@ -227,6 +162,3 @@ pub(crate) fn differences(
     }
     notes
 }
-
-#[cfg(test)]
-mod tests;
