@@ -365,7 +365,6 @@ impl Controller {
                     Mover::Ramp(JointSpeed::new(last, &Joints::zeros(), pace))
                 }
             }
-            Goal::Motion(MotionKind::Stand { .. }) => return Err(Refusal::NotAMotion),
             Goal::JointSpeed {
                 speed,
                 acceleration,
@@ -477,9 +476,8 @@ impl Controller {
                 pace,
                 blend_m,
             } => (tool(to, Some(via_m), pace), *blend_m),
-            MotionKind::Servo { .. } | MotionKind::Stand { .. } | MotionKind::Stop { .. } => {
-                return Err(Refusal::NotAMotion);
-            }
+            // No moves from rest to rest.
+            MotionKind::Servo { .. } | MotionKind::Stop { .. } => return Ok(None),
         };
         let course = course.map_err(|error| match error {
             NoCourse::NoCircle => Refusal::NoCircle,

@@ -94,7 +94,7 @@ pub struct Move {
 /// Kinds of motions. Poses and speeds of the tool are in the controller's base frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Goal {
-    /// As a program has them; [`MotionKind::Stand`] is none of the controller's.
+    /// As a program has them.
     Motion(MotionKind),
     /// `speedj`: joint speeds, until the next motion.
     JointSpeed {
@@ -170,9 +170,6 @@ pub enum Refusal {
     /// A move that would take no time, or longer than a day.
     #[error("a, v or t of the move give no course")]
     Pace,
-    /// `sleep` is the program's own.
-    #[error("a sleep is no motion")]
-    NotAMotion,
 }
 
 const MOST_JOINT_RAD: f64 = 700.0;
@@ -279,7 +276,6 @@ impl Move {
                     within("lookahead_time", "s", *lookahead_s, [0.03, 0.2])?;
                     within("gain", "1/s^2", *gain, [100.0, 2000.0])
                 }
-                MotionKind::Stand { .. } => Err(Refusal::NotAMotion),
                 MotionKind::Stop { deceleration, .. } => {
                     value("a", "rad/s^2 or m/s^2", *deceleration, LEAST)
                 }

@@ -5,7 +5,6 @@ use crate::functions::controller::{Elements, read, write};
 use crate::functions::{arm, controller, math, matrices, poses, sockets, texts};
 use crate::host::{Bank, Message};
 use crate::live::{Live, LiveFunction, Reply};
-use crate::machine::{Installation, Machine};
 use crate::place::ScriptError;
 use crate::value::Value;
 
@@ -17,51 +16,35 @@ pub(crate) struct Builtin {
     pub parameters: &'static [&'static str],
     /// How many of them a call has to give.
     pub required: usize,
-    /// Where no controller runs.
     pub does: Does,
-    /// On a controller.
-    pub runs: Runs,
 }
 
-/// What a call does where no controller runs.
+/// What a call does.
 #[derive(Clone, Copy)]
 pub(crate) enum Does {
     /// Its arguments decide its value.
     Compute(fn(&Call) -> Result<Value, ScriptError>),
-    /// It acts upon the arm, or reads what is known of it.
-    Evaluate(fn(&mut Machine<'_>, &Call) -> Result<Value, ScriptError>),
-    /// Nothing, with a note.
-    Nothing(&'static str),
-    /// It ends the evaluation.
-    Refused(Reason),
-}
-
-/// What a call does on a controller.
-#[derive(Clone, Copy)]
-pub(crate) enum Runs {
-    /// The same; what is refused is an exception.
-    AsEvaluated,
-    /// Something of its own.
+    /// It acts upon the controller, or reads it.
     Call(LiveFunction),
     /// It reads an element of a bank.
     Read(Elements),
     /// It writes one.
     Write(Elements),
+    /// Nothing, with a note.
+    Nothing(&'static str),
+    /// It is an exception.
+    Refused(Reason),
 }
 
 impl Builtin {
     /// The parameters are known.
     pub fn has_parameters(&self) -> bool {
-        let is_unknown = matches!(self.does, Does::Nothing(_) | Does::Refused(_));
-        !(is_unknown && matches!(self.runs, Runs::AsEvaluated))
+        !matches!(self.does, Does::Nothing(_) | Does::Refused(_))
     }
 
-    /// Its calls change nothing on a controller either, and are noted.
+    /// Its calls change nothing, and are noted.
     pub fn only_notes(&self) -> bool {
-        matches!(
-            (self.runs, self.does),
-            (Runs::AsEvaluated, Does::Nothing(_))
-        )
+        matches!(self.does, Does::Nothing(_))
     }
 
     /// The first parameter that has to be given and is not.
@@ -70,51 +53,24 @@ impl Builtin {
         missing.map(|index| self.parameters[index])
     }
 
-    /// Evaluates a call where no controller runs.
-    pub fn evaluate(&self, machine: &mut Machine<'_>, call: &Call) -> Result<Value, ScriptError> {
-        match self.does {
-            Does::Compute(function) => function(call),
-            Does::Evaluate(function) => function(machine, call),
-            Does::Nothing(_) | Does::Refused(_) => Ok(Value::Nothing),
-        }
-    }
-
-    /// Does a call on a controller.
+    /// Does a call.
     pub fn run(&self, live: &mut Live<'_>, call: &Call) -> Result<Reply, ScriptError> {
-        match (self.runs, self.does) {
-            (Runs::Call(function), _) => function(live, call),
-            (Runs::Read(elements), _) => read(live, call, elements),
-            (Runs::Write(elements), _) => write(live, call, elements),
-            (Runs::AsEvaluated, Does::Compute(function)) => function(call).map(Reply::Value),
-            (Runs::AsEvaluated, Does::Evaluate(function)) => {
-                let before = live.host.belief().clone();
-                let (mut belief, installation) = (before.clone(), Installation::default());
-                let mut machine = Machine::new(live, &installation, &mut belief).live();
-                let value = function(&mut machine, call)?;
-                let has_begun = machine.motions > 0;
-                if belief != before {
-                    live.host.set_belief(belief);
-                }
-                Ok(if has_begun {
-                    Reply::Moving
-                } else {
-                    Reply::Value(value)
-                })
-            }
-            (Runs::AsEvaluated, Does::Nothing(note)) => {
+        match self.does {
+            Does::Compute(function) => function(call).map(Reply::Value),
+            Does::Call(function) => function(live, call),
+            Does::Read(elements) => read(live, call, elements),
+            Does::Write(elements) => write(live, call, elements),
+            Does::Nothing(note) => {
                 let message = Message::NotSimulated(note);
                 live.host.message(message, call.place);
                 Ok(Reply::Value(Value::Nothing))
             }
-            (Runs::AsEvaluated, Does::Refused(reason)) => {
-                let reason = reason.in_words();
-                Err(call.error(format!("it {reason}, which is not simulated")))
-            }
+            Does::Refused(reason) => Err(call.error(reason.in_words())),
         }
     }
 }
 
-/// Why a call is not evaluated.
+/// Why a call is not simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reason {
     Measured,
@@ -122,7 +78,6 @@ pub(crate) enum Reason {
     Network,
     Person,
     Force,
-    Speed,
     Tracking,
     Planned,
     Chance,
@@ -132,65 +87,66 @@ pub(crate) enum Reason {
 }
 
 impl Reason {
-    /// What the function does, and why that is not evaluated.
-    pub fn in_words(self) -> &'static str {
-        match self {
+    /// What the function does, and that it is not simulated.
+    pub fn in_words(self) -> String {
+        let what = match self {
             Self::Measured => "reads the arm's measured state",
             Self::Input => "reads an input of the controller",
             Self::Network => "exchanges data with another device or program",
             Self::Person => "waits for a person's answer",
             Self::Force => "moves by forces, or with the arm's stiffness changed",
-            Self::Speed => "moves at a speed until something stops it",
             Self::Tracking => "moves with a conveyor, or on an offset",
             Self::Planned => "moves on a course that only the controller knows",
             Self::Chance => "is random",
             Self::Clock => "reads the clock",
             Self::Safety => "depends on the robot's safety configuration, or changes its state",
-            Self::Language => "is not evaluated",
-        }
+            Self::Language => return "it is not simulated".to_owned(),
+        };
+        format!("it {what}, which is not simulated")
     }
 }
 
-/// What a note says of outputs where no controller runs.
-const OUTPUTS: &str = "outputs, which nothing here reads";
-
-const fn computed(
-    name: &'static str,
-    required: usize,
-    parameters: &'static [&'static str],
-    function: fn(&Call) -> Result<Value, ScriptError>,
-) -> Builtin {
-    let does = Does::Compute(function);
-    live(name, required, parameters, does, Runs::AsEvaluated)
-}
-
-const fn evaluated(
-    name: &'static str,
-    required: usize,
-    parameters: &'static [&'static str],
-    function: fn(&mut Machine<'_>, &Call) -> Result<Value, ScriptError>,
-) -> Builtin {
-    let does = Does::Evaluate(function);
-    live(name, required, parameters, does, Runs::AsEvaluated)
-}
-
-const fn live(
+const fn function(
     name: &'static str,
     required: usize,
     parameters: &'static [&'static str],
     does: Does,
-    runs: Runs,
 ) -> Builtin {
     Builtin {
         name,
         parameters,
         required,
         does,
-        runs,
     }
 }
 
-/// What is evaluated or runs, by name.
+const fn computed(
+    name: &'static str,
+    required: usize,
+    parameters: &'static [&'static str],
+    computes: fn(&Call) -> Result<Value, ScriptError>,
+) -> Builtin {
+    function(name, required, parameters, Does::Compute(computes))
+}
+
+const fn call(
+    name: &'static str,
+    required: usize,
+    parameters: &'static [&'static str],
+    calls: LiveFunction,
+) -> Builtin {
+    function(name, required, parameters, Does::Call(calls))
+}
+
+const fn reads(name: &'static str, parameters: &'static [&'static str], of: Elements) -> Builtin {
+    function(name, 1, parameters, Does::Read(of))
+}
+
+const fn writes(name: &'static str, parameters: &'static [&'static str], of: Elements) -> Builtin {
+    function(name, 2, parameters, Does::Write(of))
+}
+
+/// Functions by name.
 static FUNCTIONS: [Builtin; 134] = [
     computed("acos", 1, &["f"], math::acos),
     computed("asin", 1, &["f"], math::asin),
@@ -201,107 +157,57 @@ static FUNCTIONS: [Builtin; 134] = [
     computed("cos", 1, &["f"], math::cos),
     computed("d2r", 1, &["d"], math::d2r),
     computed("floor", 1, &["f"], math::floor),
-    live(
-        "force",
-        0,
-        &[],
-        Does::Refused(Reason::Measured),
-        Runs::Call(controller::force),
-    ),
-    live(
-        "get_actual_joint_positions",
-        0,
-        &[],
-        Does::Evaluate(arm::joints_before_the_first_motion),
-        Runs::Call(|live, _| controller::joints(live, |state| &state.joints)),
-    ),
-    live(
+    call("force", 0, &[], controller::force),
+    call("get_actual_joint_positions", 0, &[], |live, _| {
+        controller::joints(live, |state| &state.joints)
+    }),
+    call(
         "get_actual_joint_positions_history",
         0,
         &["steps"],
-        Does::Refused(Reason::Measured),
-        Runs::Call(controller::joints_ago),
+        controller::joints_ago,
     ),
-    live(
-        "get_actual_joint_speeds",
-        0,
-        &[],
-        Does::Refused(Reason::Measured),
-        Runs::Call(|live, _| controller::joints(live, |state| &state.joint_speeds)),
-    ),
-    live(
-        "get_actual_tcp_pose",
-        0,
-        &[],
-        Does::Evaluate(arm::tcp_before_the_first_motion),
-        Runs::Call(controller::tcp_pose),
-    ),
-    live(
-        "get_actual_tcp_speed",
-        0,
-        &[],
-        Does::Refused(Reason::Measured),
-        Runs::Call(|live, _| controller::six(live, |state| &state.tool_speed)),
-    ),
-    live(
+    call("get_actual_joint_speeds", 0, &[], |live, _| {
+        controller::joints(live, |state| &state.joint_speeds)
+    }),
+    call("get_actual_tcp_pose", 0, &[], controller::tcp_pose),
+    call("get_actual_tcp_speed", 0, &[], |live, _| {
+        controller::six(live, |state| &state.tool_speed)
+    }),
+    call(
         "get_actual_tool_flange_pose",
         0,
         &[],
-        Does::Evaluate(arm::flange_before_the_first_motion),
-        Runs::Call(controller::flange_pose),
+        controller::flange_pose,
     ),
-    live(
-        "get_analog_in",
-        1,
-        &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::AnalogInput)),
-    ),
-    live(
+    reads("get_analog_in", &["n"], Elements::all(Bank::AnalogInput)),
+    reads(
         "get_configurable_digital_in",
-        1,
         &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements {
+        Elements {
             bank: Bank::DigitalInput,
             first: 8,
             count: 8,
-        }),
+        },
     ),
-    live(
+    reads(
         "get_configurable_digital_out",
-        1,
         &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements {
+        Elements {
             bank: Bank::DigitalOutput,
             first: 8,
             count: 8,
-        }),
+        },
     ),
-    live(
-        "get_digital_in",
-        1,
-        &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::DigitalInput)),
-    ),
-    live(
+    reads("get_digital_in", &["n"], Elements::all(Bank::DigitalInput)),
+    reads(
         "get_digital_out",
-        1,
         &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::DigitalOutput)),
+        Elements::all(Bank::DigitalOutput),
     ),
-    live(
-        "get_flag",
-        1,
-        &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::Flag)),
-    ),
-    evaluated("get_forward_kin", 0, &["q", "tcp"], arm::forward),
-    evaluated(
+    reads("get_flag", &["n"], Elements::all(Bank::Flag)),
+    call("get_forward_kin", 0, &["q", "tcp"], arm::forward),
+    call(
         "get_inverse_kin",
         1,
         &[
@@ -313,7 +219,7 @@ static FUNCTIONS: [Builtin; 134] = [
         ],
         arm::inverse,
     ),
-    evaluated(
+    call(
         "get_inverse_kin_has_solution",
         1,
         &[
@@ -325,140 +231,90 @@ static FUNCTIONS: [Builtin; 134] = [
         ],
         arm::has_inverse,
     ),
-    live(
-        "get_joint_positions",
-        0,
-        &[],
-        Does::Evaluate(arm::joints_before_the_first_motion),
-        Runs::Call(|live, _| controller::joints(live, |state| &state.joints)),
-    ),
-    live(
-        "get_joint_speeds",
-        0,
-        &[],
-        Does::Refused(Reason::Measured),
-        Runs::Call(|live, _| controller::joints(live, |state| &state.joint_speeds)),
-    ),
-    live(
-        "get_joint_torques",
-        0,
-        &[],
-        Does::Refused(Reason::Measured),
-        Runs::Call(|live, _| controller::joints(live, |state| &state.joint_torques)),
-    ),
+    call("get_joint_positions", 0, &[], |live, _| {
+        controller::joints(live, |state| &state.joints)
+    }),
+    call("get_joint_speeds", 0, &[], |live, _| {
+        controller::joints(live, |state| &state.joint_speeds)
+    }),
+    call("get_joint_torques", 0, &[], |live, _| {
+        controller::joints(live, |state| &state.joint_torques)
+    }),
     computed("get_list_length", 1, &["v"], texts::length),
-    live(
-        "get_robot_mode",
-        0,
-        &[],
-        Does::Refused(Reason::Safety),
-        Runs::Call(controller::robot_mode),
-    ),
-    live(
-        "get_safety_mode",
-        0,
-        &[],
-        Does::Refused(Reason::Safety),
-        Runs::Call(controller::safety_mode),
-    ),
-    live(
+    call("get_robot_mode", 0, &[], controller::robot_mode),
+    call("get_safety_mode", 0, &[], controller::safety_mode),
+    reads(
         "get_standard_analog_in",
-        1,
         &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements {
+        Elements {
             bank: Bank::AnalogInput,
             first: 0,
             count: 2,
-        }),
+        },
     ),
-    live(
+    reads(
         "get_standard_analog_out",
-        1,
         &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::AnalogOutput)),
+        Elements::all(Bank::AnalogOutput),
     ),
-    live(
+    reads(
         "get_standard_digital_in",
-        1,
         &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements {
+        Elements {
             bank: Bank::DigitalInput,
             first: 0,
             count: 8,
-        }),
+        },
     ),
-    live(
+    reads(
         "get_standard_digital_out",
-        1,
         &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements {
+        Elements {
             bank: Bank::DigitalOutput,
             first: 0,
             count: 8,
-        }),
+        },
     ),
-    evaluated("get_steptime", 0, &[], arm::period),
-    evaluated("get_target_joint_positions", 0, &[], arm::target_joints),
-    live(
-        "get_target_joint_speeds",
-        0,
-        &[],
-        Does::Refused(Reason::Language),
-        Runs::Call(|live, _| controller::joints(live, |state| &state.target_joint_speeds)),
-    ),
-    evaluated("get_target_payload", 0, &[], arm::payload),
-    evaluated("get_target_tcp_pose", 0, &[], arm::target_tcp),
-    live(
-        "get_target_tcp_speed",
-        0,
-        &[],
-        Does::Refused(Reason::Language),
-        Runs::Call(|live, _| controller::six(live, |state| &state.target_tool_speed)),
-    ),
-    live(
-        "get_tcp_force",
-        0,
-        &[],
-        Does::Refused(Reason::Measured),
-        Runs::Call(|live, _| controller::six(live, |state| &state.tool_force)),
-    ),
-    evaluated("get_tcp_offset", 0, &[], arm::tcp_offset),
-    live(
+    call("get_steptime", 0, &[], arm::period),
+    call("get_target_joint_positions", 0, &[], arm::target_joints),
+    call("get_target_joint_speeds", 0, &[], |live, _| {
+        controller::joints(live, |state| &state.target_joint_speeds)
+    }),
+    call("get_target_payload", 0, &[], arm::payload),
+    call("get_target_tcp_pose", 0, &[], arm::target_tcp),
+    call("get_target_tcp_speed", 0, &[], |live, _| {
+        controller::six(live, |state| &state.target_tool_speed)
+    }),
+    call("get_tcp_force", 0, &[], |live, _| {
+        controller::six(live, |state| &state.tool_force)
+    }),
+    call("get_tcp_offset", 0, &[], arm::tcp_offset),
+    reads(
         "get_tool_analog_in",
-        1,
         &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements {
+        Elements {
             bank: Bank::AnalogInput,
             first: 2,
             count: 2,
-        }),
+        },
     ),
-    live(
+    reads(
         "get_tool_digital_in",
-        1,
         &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements {
+        Elements {
             bank: Bank::DigitalInput,
             first: 16,
             count: 2,
-        }),
+        },
     ),
-    live(
+    reads(
         "get_tool_digital_out",
-        1,
         &["n"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements {
+        Elements {
             bank: Bank::DigitalOutput,
             first: 16,
             count: 2,
-        }),
+        },
     ),
     computed("integer_to_binary_list", 1, &["x"], texts::bits),
     computed(
@@ -468,54 +324,39 @@ static FUNCTIONS: [Builtin; 134] = [
         poses::interpolate,
     ),
     computed("inv", 1, &["m"], matrices::inverse),
-    live(
-        "is_steady",
-        0,
-        &[],
-        Does::Refused(Reason::Measured),
-        Runs::Call(controller::is_steady),
-    ),
-    live(
+    call("is_steady", 0, &[], controller::is_steady),
+    call(
         "is_within_safety_limits",
         1,
         &["pose"],
-        Does::Refused(Reason::Safety),
-        Runs::Call(controller::is_within_limits),
+        controller::is_within_limits,
     ),
     computed("length", 1, &["v"], texts::length),
     computed("log", 2, &["b", "f"], math::log),
-    evaluated(
+    call(
         "movec",
         2,
         &["pose_via", "pose_to", "a", "v", "r", "mode"],
         arm::movec,
     ),
-    evaluated("movej", 1, &["q", "a", "v", "t", "r"], arm::movej),
-    evaluated("movel", 1, &["pose", "a", "v", "t", "r"], arm::movel),
-    evaluated("movep", 1, &["pose", "a", "v", "r"], arm::movep),
+    call("movej", 1, &["q", "a", "v", "t", "r"], arm::movej),
+    call("movel", 1, &["pose", "a", "v", "t", "r"], arm::movel),
+    call("movep", 1, &["pose", "a", "v", "r"], arm::movep),
     computed("norm", 1, &["a"], math::norm),
     computed("normalize", 1, &["v"], math::normalize),
-    live(
-        "optimovej",
-        1,
-        &["q", "a", "v", "r"],
-        Does::Refused(Reason::Planned),
-        Runs::Call(controller::optimovej),
-    ),
-    live(
+    call("optimovej", 1, &["q", "a", "v", "r"], controller::optimovej),
+    call(
         "optimovel",
         1,
         &["pose", "a", "v", "r"],
-        Does::Refused(Reason::Planned),
-        Runs::Call(controller::optimovel),
+        controller::optimovel,
     ),
     computed("point_dist", 2, &["p_from", "p_to"], poses::distance),
-    live(
+    call(
         "popup",
         1,
         &["s", "title", "warning", "error", "blocking"],
-        Does::Evaluate(texts::popup),
-        Runs::Call(controller::popup),
+        controller::popup,
     ),
     computed("pose_add", 2, &["p_1", "p_2"], poses::add),
     computed("pose_dist", 2, &["p_from", "p_to"], poses::distance),
@@ -523,55 +364,37 @@ static FUNCTIONS: [Builtin; 134] = [
     computed("pose_sub", 2, &["p_to", "p_from"], poses::subtract),
     computed("pose_trans", 2, &["p_from", "p_from_to"], poses::transform),
     computed("pow", 2, &["base", "exponent"], math::pow),
-    live(
-        "protective_stop",
-        0,
-        &[],
-        Does::Refused(Reason::Safety),
-        Runs::Call(controller::protective_stop),
-    ),
+    call("protective_stop", 0, &[], controller::protective_stop),
     computed("r2d", 1, &["r"], math::r2d),
-    live(
+    reads(
         "read_input_boolean_register",
-        1,
         &["address"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::InputBoolean)),
+        Elements::all(Bank::InputBoolean),
     ),
-    live(
+    reads(
         "read_input_float_register",
-        1,
         &["address"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::InputFloat)),
+        Elements::all(Bank::InputFloat),
     ),
-    live(
+    reads(
         "read_input_integer_register",
-        1,
         &["address"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::InputInteger)),
+        Elements::all(Bank::InputInteger),
     ),
-    live(
+    reads(
         "read_output_boolean_register",
-        1,
         &["address"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::OutputBoolean)),
+        Elements::all(Bank::OutputBoolean),
     ),
-    live(
+    reads(
         "read_output_float_register",
-        1,
         &["address"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::OutputFloat)),
+        Elements::all(Bank::OutputFloat),
     ),
-    live(
+    reads(
         "read_output_integer_register",
-        1,
         &["address"],
-        Does::Refused(Reason::Input),
-        Runs::Read(Elements::all(Bank::OutputInteger)),
+        Elements::all(Bank::OutputInteger),
     ),
     computed(
         "rotvec2rpy",
@@ -580,157 +403,114 @@ static FUNCTIONS: [Builtin; 134] = [
         poses::rpy_from_vector,
     ),
     computed("rpy2rotvec", 1, &["rpy_vector"], poses::vector_from_rpy),
-    live(
+    call(
         "rtde_set_watchdog",
         2,
         &["variable_name", "min_frequency", "action"],
-        Does::Refused(Reason::Network),
-        Runs::Call(controller::set_watchdog),
+        controller::set_watchdog,
     ),
-    live(
-        "servoc",
-        1,
-        &["pose", "a", "v", "r"],
-        Does::Refused(Reason::Planned),
-        Runs::Call(controller::servoc),
-    ),
-    evaluated(
+    call("servoc", 1, &["pose", "a", "v", "r"], controller::servoc),
+    call(
         "servoj",
         1,
         &["q", "a", "v", "t", "lookahead_time", "gain"],
         arm::servoj,
     ),
-    live(
+    writes(
         "set_analog_out",
-        2,
         &["n", "f"],
-        Does::Nothing(OUTPUTS),
-        Runs::Write(Elements::all(Bank::AnalogOutput)),
+        Elements::all(Bank::AnalogOutput),
     ),
-    live(
+    writes(
         "set_configurable_digital_out",
-        2,
         &["n", "b"],
-        Does::Nothing(OUTPUTS),
-        Runs::Write(Elements {
+        Elements {
             bank: Bank::DigitalOutput,
             first: 8,
             count: 8,
-        }),
+        },
     ),
-    live(
+    writes(
         "set_digital_out",
-        2,
         &["n", "b"],
-        Does::Nothing(OUTPUTS),
-        Runs::Write(Elements::all(Bank::DigitalOutput)),
+        Elements::all(Bank::DigitalOutput),
     ),
-    live(
-        "set_flag",
-        2,
-        &["n", "b"],
-        Does::Nothing(OUTPUTS),
-        Runs::Write(Elements::all(Bank::Flag)),
-    ),
-    evaluated("set_gravity", 1, &["d"], arm::set_gravity),
-    evaluated("set_payload", 1, &["m", "cog"], arm::set_payload),
-    evaluated("set_payload_cog", 1, &["cog"], arm::set_centre),
-    evaluated("set_payload_mass", 1, &["m"], arm::set_mass),
-    live(
+    writes("set_flag", &["n", "b"], Elements::all(Bank::Flag)),
+    call("set_gravity", 1, &["d"], arm::set_gravity),
+    call("set_payload", 1, &["m", "cog"], arm::set_payload),
+    call("set_payload_cog", 1, &["cog"], arm::set_centre),
+    call("set_payload_mass", 1, &["m"], arm::set_mass),
+    writes(
         "set_standard_analog_out",
-        2,
         &["n", "f"],
-        Does::Nothing(OUTPUTS),
-        Runs::Write(Elements::all(Bank::AnalogOutput)),
+        Elements::all(Bank::AnalogOutput),
     ),
-    live(
+    writes(
         "set_standard_digital_out",
-        2,
         &["n", "b"],
-        Does::Nothing(OUTPUTS),
-        Runs::Write(Elements {
+        Elements {
             bank: Bank::DigitalOutput,
             first: 0,
             count: 8,
-        }),
+        },
     ),
-    evaluated(
+    call(
         "set_target_payload",
         1,
         &["m", "cog", "inertia", "transition_time"],
         arm::set_payload,
     ),
-    evaluated("set_tcp", 1, &["pose", "tcp_name"], arm::set_tcp),
-    live(
+    call("set_tcp", 1, &["pose", "tcp_name"], arm::set_tcp),
+    writes(
         "set_tool_digital_out",
-        2,
         &["n", "b"],
-        Does::Nothing(OUTPUTS),
-        Runs::Write(Elements {
+        Elements {
             bank: Bank::DigitalOutput,
             first: 16,
             count: 2,
-        }),
+        },
     ),
     computed("sin", 1, &["f"], math::sin),
     computed("size", 1, &["v"], matrices::size),
-    live(
-        "sleep",
-        1,
-        &["t"],
-        Does::Evaluate(arm::sleep),
-        Runs::Call(controller::sleep),
-    ),
-    live(
-        "socket_close",
-        0,
-        &["socket_name"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::close),
-    ),
-    live(
+    call("sleep", 1, &["t"], controller::sleep),
+    call("socket_close", 0, &["socket_name"], sockets::close),
+    call(
         "socket_get_var",
         1,
         &["name", "socket_name"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::get_var),
+        sockets::get_var,
     ),
-    live(
+    call(
         "socket_open",
         2,
         &["address", "port", "socket_name"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::open),
+        sockets::open,
     ),
-    live(
+    call(
         "socket_read_ascii_float",
         1,
         &["number", "socket_name", "timeout"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::read_floats),
+        sockets::read_floats,
     ),
-    live(
+    call(
         "socket_read_binary_integer",
         1,
         &["number", "socket_name", "timeout"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::read_integers),
+        sockets::read_integers,
     ),
-    live(
+    call(
         "socket_read_byte_list",
         1,
         &["number", "socket_name", "timeout"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::read_bytes),
+        sockets::read_bytes,
     ),
-    live(
+    call(
         "socket_read_line",
         0,
         &["socket_name", "timeout"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::read_line),
+        sockets::read_line,
     ),
-    live(
+    call(
         "socket_read_string",
         0,
         &[
@@ -740,127 +520,73 @@ static FUNCTIONS: [Builtin; 134] = [
             "interpret_escape",
             "timeout",
         ],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::read_string),
+        sockets::read_string,
     ),
-    live(
+    call(
         "socket_send_byte",
         1,
         &["value", "socket_name"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::send_byte),
+        sockets::send_byte,
     ),
-    live(
+    call(
         "socket_send_int",
         1,
         &["value", "socket_name"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::send_int),
+        sockets::send_int,
     ),
-    live(
+    call(
         "socket_send_line",
         1,
         &["str", "socket_name"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::send_line),
+        sockets::send_line,
     ),
-    live(
+    call(
         "socket_send_string",
         1,
         &["str", "socket_name"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::send_string),
+        sockets::send_string,
     ),
-    live(
+    call(
         "socket_set_var",
         2,
         &["name", "value", "socket_name"],
-        Does::Refused(Reason::Network),
-        Runs::Call(sockets::set_var),
+        sockets::set_var,
     ),
-    live(
-        "speedj",
-        1,
-        &["qd", "a", "t"],
-        Does::Refused(Reason::Speed),
-        Runs::Call(controller::speedj),
-    ),
-    live(
-        "speedl",
-        1,
-        &["xd", "a", "t", "aRot"],
-        Does::Refused(Reason::Speed),
-        Runs::Call(controller::speedl),
-    ),
+    call("speedj", 1, &["qd", "a", "t"], controller::speedj),
+    call("speedl", 1, &["xd", "a", "t", "aRot"], controller::speedl),
     computed("sqrt", 1, &["f"], math::sqrt),
-    evaluated("stopj", 1, &["a"], arm::stopj),
-    evaluated("stopl", 1, &["a", "aRot"], arm::stopl),
+    call("stopj", 1, &["a"], arm::stopj),
+    call("stopl", 1, &["a", "aRot"], arm::stopl),
     computed("str_at", 2, &["src", "index"], texts::at),
     computed("str_cat", 2, &["op1", "op2"], texts::concatenate),
     computed("str_empty", 1, &["str"], texts::is_empty),
     computed("str_find", 2, &["src", "target", "start_from"], texts::find),
     computed("str_len", 1, &["str"], texts::length),
     computed("str_sub", 2, &["src", "index", "len"], texts::part),
-    live(
-        "sync",
-        0,
-        &[],
-        Does::Evaluate(arm::sync),
-        Runs::Call(controller::sync),
-    ),
+    call("sync", 0, &[], controller::sync),
     computed("tan", 1, &["f"], math::tan),
-    live(
-        "textmsg",
-        1,
-        &["s1", "s2"],
-        Does::Evaluate(texts::message),
-        Runs::Call(controller::message),
-    ),
-    live(
-        "time",
-        0,
-        &["mode"],
-        Does::Refused(Reason::Clock),
-        Runs::Call(controller::time),
-    ),
+    call("textmsg", 1, &["s1", "s2"], controller::message),
+    call("time", 0, &["mode"], controller::time),
     computed("to_num", 1, &["str"], texts::number),
     computed("to_str", 1, &["val"], texts::to_text),
-    live(
-        "tool_contact",
-        0,
-        &["direction"],
-        Does::Refused(Reason::Measured),
-        Runs::Call(controller::tool_contact),
-    ),
+    call("tool_contact", 0, &["direction"], controller::tool_contact),
     computed("transpose", 1, &["m"], matrices::transpose),
-    live(
+    writes(
         "write_output_boolean_register",
-        2,
         &["address", "value"],
-        Does::Nothing(OUTPUTS),
-        Runs::Write(Elements::all(Bank::OutputBoolean)),
+        Elements::all(Bank::OutputBoolean),
     ),
-    live(
+    writes(
         "write_output_float_register",
-        2,
         &["address", "value"],
-        Does::Nothing(OUTPUTS),
-        Runs::Write(Elements::all(Bank::OutputFloat)),
+        Elements::all(Bank::OutputFloat),
     ),
-    live(
+    writes(
         "write_output_integer_register",
-        2,
         &["address", "value"],
-        Does::Nothing(OUTPUTS),
-        Runs::Write(Elements::all(Bank::OutputInteger)),
+        Elements::all(Bank::OutputInteger),
     ),
-    live(
-        "zero_ftsensor",
-        0,
-        &[],
-        Does::Refused(Reason::Force),
-        Runs::Call(controller::zero_force),
-    ),
+    call("zero_ftsensor", 0, &[], controller::zero_force),
 ];
 
 /// What changes nothing of the motion, with what is noted of it.
@@ -901,7 +627,7 @@ static NOTHING: [(&str, &[&str]); 3] = [
         ],
     ),
     (
-        OUTPUTS,
+        "outputs, which nothing here reads",
         &[
             "modbus_set_output_register",
             "modbus_set_output_signal",
@@ -913,7 +639,7 @@ static NOTHING: [(&str, &[&str]); 3] = [
     ("messages to a person, answered at once", &["beep"]),
 ];
 
-/// What is known and not evaluated, with the reason.
+/// What is known and not simulated, with the reason.
 static REFUSED: [(Reason, &[&str]); 11] = [
     (
         Reason::Measured,
@@ -1058,7 +784,6 @@ pub(crate) fn builtin(name: &str) -> Option<Builtin> {
         parameters: &[],
         required: 0,
         does,
-        runs: Runs::AsEvaluated,
     };
     for (note, names) in &NOTHING {
         if let Some(name) = names.iter().find(|each| **each == name) {

@@ -6,7 +6,7 @@ use crate::builtin::builtin;
 use crate::call::arguments_of;
 use crate::code::{Code, Constant, NO_LOCAL, Op, PathStep, Routine, Shape, Slot, Target};
 use crate::lexer::shortened;
-use crate::load::{Entry, Load};
+use crate::load::{Entry, Load, not_found};
 use crate::parser::parse;
 use crate::place::{Place, ScriptError};
 use crate::tree::{
@@ -42,7 +42,7 @@ impl Program {
     /// with too many, too few or unknown arguments; with its place.
     pub fn load(text: &str) -> Result<Self, ScriptError> {
         let tree = parse(text)?;
-        let load = Load::new(&tree, not_found)?;
+        let load = Load::new(&tree)?;
         let mut compiler = Compiler::new(&load);
         let secondaries = secondaries(&tree);
         let has_main = tree.statements.iter().any(|statement| {
@@ -94,10 +94,6 @@ impl Program {
     pub fn is_secondary(&self) -> bool {
         self.code.main.is_none()
     }
-}
-
-fn not_found(name: &str) -> String {
-    format!("compile_error_name_not_found:{name}:")
 }
 
 /// The `sec`s of the first level.
@@ -523,7 +519,7 @@ impl<'a> Compiler<'a> {
     /// The function of the program that a name means.
     fn own(&self, draft: &Draft<'a>, place: Place, name: &str) -> Result<usize, ScriptError> {
         let found = self.load.function(draft.scope, name);
-        found.ok_or_else(|| ScriptError::new(place, not_found(&shortened(name))))
+        found.ok_or_else(|| ScriptError::new(place, not_found(name)))
     }
 
     fn own_shape(
@@ -577,8 +573,7 @@ impl<'a> Compiler<'a> {
             })
         } else {
             let found = builtin(name);
-            let found =
-                found.ok_or_else(|| ScriptError::new(place, not_found(&shortened(name))))?;
+            let found = found.ok_or_else(|| ScriptError::new(place, not_found(name)))?;
             let of = if found.has_parameters() {
                 arguments_of(place, found.name, found.parameters, arguments)?
             } else {

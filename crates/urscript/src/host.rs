@@ -111,7 +111,7 @@ pub struct ArmState {
 /// What moves an arm. Lengths in m, angles in rad; poses are `base_from_tcp`, in the controller's base frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Request {
-    /// Everything that programs without a clock know too.
+    /// Moves, `servoj` and stops.
     Move(Motion),
     /// `speedj`: joint speeds until something else is begun.
     JointSpeeds {

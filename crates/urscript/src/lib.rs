@@ -1,9 +1,8 @@
 //! Programs in URScript, the language of the controllers of UR arms.
 //!
-//! [`parse`] makes of a text a tree in which everything has its line and column. [`evaluate`] does what a program does
-//! whose course constants decide, and gives its motions to an [`Arm`]. [`Program`] is a text that was checked as a
-//! whole, and [`Run`] does it cycle by cycle on a [`Host`], a controller with its clock. No files, no clock and no arm
-//! but those.
+//! [`parse`] makes of a text a tree in which everything has its line and column. [`Program`] is a text that was checked
+//! as a whole, and [`Run`] does it cycle by cycle on a [`Host`], a controller with its clock. No files, no clock and no
+//! arm but those.
 #![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
 
 mod builtin;
@@ -11,13 +10,11 @@ mod call;
 mod code;
 mod compile;
 mod elements;
-mod evaluate;
 mod functions;
 mod host;
 mod lexer;
 mod live;
 mod load;
-mod machine;
 mod motion;
 mod operators;
 mod parser;
@@ -28,10 +25,8 @@ mod value;
 mod walk;
 
 pub use compile::Program;
-pub use evaluate::{MOST_STEPS, Outcome, evaluate};
 pub use host::{ArmState, Bank, Host, Message, Request, Signal};
-pub use machine::Installation;
-pub use motion::{Arm, Belief, Motion, MotionKind, Pace};
+pub use motion::{Belief, Motion, MotionKind, Pace};
 pub use parser::{MOST_BYTES, MOST_LEVELS, parse};
 pub use place::{Place, ScriptError};
 pub use run::{End, LONGEST_BUSY_S, MOST_INSTRUCTIONS, MOST_THREADS, Progress, Run};

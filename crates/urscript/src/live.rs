@@ -1,10 +1,9 @@
 //! One call of a built-in function on a controller.
 
-use needlebench_kinematics::{Joints, Pose};
+use needlebench_kinematics::Pose;
 
 use crate::call::Call;
 use crate::host::{Host, Request};
-use crate::motion::{Arm, Motion};
 use crate::place::{Place, ScriptError};
 use crate::value::Value;
 
@@ -50,34 +49,11 @@ impl Live<'_> {
     /// The tool's point in the flange's frame.
     pub fn tcp(&self, call: &Call) -> Result<Pose, ScriptError> {
         let known = self.host.belief().flange_from_tcp;
-        known.ok_or_else(|| call.error("no TCP is set, and that of the installation is not known"))
-    }
-}
-
-/// The arm of motions that programs without a clock know too.
-impl Arm for Live<'_> {
-    #[expect(
-        clippy::misnamed_getters,
-        reason = "motions begin where the set-point is"
-    )]
-    fn joints(&self) -> Joints {
-        self.host.state().target_joints
-    }
-
-    fn base_from_flange(&self, joints: &Joints) -> Pose {
-        self.host.base_from_flange(joints)
-    }
-
-    fn inverse(&mut self, base_from_flange: &Pose, near: &Joints) -> Option<Joints> {
-        self.host.inverse(base_from_flange, near)
-    }
-
-    fn period_s(&self) -> f64 {
-        self.host.period_s()
-    }
-
-    fn perform(&mut self, motion: &Motion) -> Result<(), ScriptError> {
-        self.begin(&Request::Move(motion.clone()), motion.place)?;
-        Ok(())
+        known.ok_or_else(|| {
+            let reason =
+                "the program sets no TCP before this, and that of the installation is not known";
+            call.error(reason)
+                .hint("add set_tcp(p[...]) to the program, or say with --tcp which point it is")
+        })
     }
 }

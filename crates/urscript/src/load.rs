@@ -30,24 +30,20 @@ pub(crate) struct Load<'a> {
     pub functions: Vec<Loaded<'a>>,
     /// Functions by the one they are defined in and their name.
     by_name: BTreeMap<(Option<usize>, &'a str), usize>,
-    /// Threads that count and do nothing else that the program could see.
-    pub counting: BTreeSet<usize>,
 }
 
 impl<'a> Load<'a> {
     /// Prepares a program.
     ///
     /// # Errors
-    /// A name that nothing has, as `unknown` says it.
-    pub fn new(program: &'a Program, unknown: fn(&str) -> String) -> Result<Self, ScriptError> {
+    /// A name that nothing has.
+    pub fn new(program: &'a Program) -> Result<Self, ScriptError> {
         let mut load = Self {
             functions: Vec::new(),
             by_name: BTreeMap::new(),
-            counting: BTreeSet::new(),
         };
         load.add(&program.statements, None)?;
-        load.check_names(program, unknown)?;
-        load.counting = load.find_counting(program);
+        load.check_names(program)?;
         Ok(load)
     }
 
@@ -98,11 +94,7 @@ impl<'a> Load<'a> {
     }
 
     /// The first name that nothing in the program has.
-    fn check_names(
-        &self,
-        program: &'a Program,
-        unknown: fn(&str) -> String,
-    ) -> Result<(), ScriptError> {
+    fn check_names(&self, program: &'a Program) -> Result<(), ScriptError> {
         let names = names(program);
         let own: BTreeSet<&str> = self.by_name.keys().map(|(_, name)| *name).collect();
         let mut wrong: Option<ScriptError> = None;
@@ -120,7 +112,7 @@ impl<'a> Load<'a> {
             if is_known || wrong.is_some() || builtin(name).is_some() && what == "function" {
                 return;
             }
-            let error = ScriptError::new(expression.place, unknown(&shortened(name)));
+            let error = ScriptError::new(expression.place, not_found(name));
             wrong = Some(match name.as_str() {
                 "true" | "false" => error.hint("truth values are True and False"),
                 _ if own.contains(name.as_str()) || builtin(name).is_some() => {
@@ -224,69 +216,11 @@ impl<'a> Load<'a> {
         let hint = "call it, or move the statements into it";
         Err(ScriptError::new(place, message).hint(hint))
     }
-
-    /// Threads that the graphical editor writes: a loop that counts in variables that nothing else reads.
-    fn find_counting(&self, program: &'a Program) -> BTreeSet<usize> {
-        let all = reads(&program.statements);
-        let threads = self.functions.iter().enumerate();
-        let threads = threads.filter(|(_, each)| each.function.kind == FunctionKind::Thread);
-        let counting = threads.filter(|(_, thread)| {
-            let mut counted: BTreeSet<&str> = BTreeSet::new();
-            let [
-                Statement {
-                    kind: StatementKind::While { body, .. },
-                    ..
-                },
-            ] = thread.function.body.as_slice()
-            else {
-                return false;
-            };
-            for statement in body {
-                match &statement.kind {
-                    StatementKind::Assign { target, value } => {
-                        let is_plain = target.parts.is_empty() && is_sum(value);
-                        if !is_plain {
-                            return false;
-                        }
-                        counted.insert(&target.name);
-                    }
-                    StatementKind::Expression(Expression {
-                        kind: ExpressionKind::Call { name, arguments },
-                        ..
-                    }) if name == "sync" && arguments.is_empty() => {}
-                    _ => return false,
-                }
-            }
-            counted
-                .iter()
-                .all(|name| all.get(name).copied() == reads(body).get(name).copied())
-        });
-        counting.map(|(index, _)| index).collect()
-    }
 }
 
-/// How often each name is read.
-fn reads(statements: &[Statement]) -> BTreeMap<&str, usize> {
-    let mut reads = BTreeMap::new();
-    walk(statements, &mut |node| {
-        if let Node::Expression(Expression {
-            kind: ExpressionKind::Name(name),
-            ..
-        }) = node
-        {
-            *reads.entry(name.as_str()).or_default() += 1;
-        }
-    });
-    reads
-}
-
-/// A number, a name, or a sum of them.
-fn is_sum(value: &Expression) -> bool {
-    match &value.kind {
-        ExpressionKind::Number(_) | ExpressionKind::Name(_) => true,
-        ExpressionKind::Binary { left, right, .. } => is_sum(left) && is_sum(right),
-        _ => false,
-    }
+/// A name that nothing has, in the words of a UR controller.
+pub(crate) fn not_found(name: &str) -> String {
+    format!("compile_error_name_not_found:{}:", shortened(name))
 }
 
 /// All names that anything in a program gets a value by.

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use needlebench_kinematics::{Joints, Pose};
 
-use crate::place::{Place, ScriptError};
+use crate::place::Place;
 
 /// One motion of a program.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,11 +68,6 @@ pub enum MotionKind {
         /// How stiffly it follows.
         gain: f64,
     },
-    /// `sleep`.
-    Stand {
-        /// How long, s.
-        time_s: f64,
-    },
     /// `stopj` and `stopl`.
     Stop {
         /// Deceleration: of joints, rad/s^2, or of the tool's point, m/s^2.
@@ -91,23 +86,6 @@ pub struct Pace {
     pub speed: f64,
     /// Duration, s: counts instead of the others where it is there.
     pub time_s: Option<f64>,
-}
-
-/// The arm that a program moves.
-pub trait Arm {
-    /// Where the last motion ends, rad; before the first one, where the arm stands.
-    fn joints(&self) -> Joints;
-    /// Pose of the flange in the controller's base frame.
-    fn base_from_flange(&self, joints: &Joints) -> Pose;
-    /// Joint positions that bring the flange to a pose in the controller's base frame: those nearest to a posture.
-    fn inverse(&mut self, base_from_flange: &Pose, near: &Joints) -> Option<Joints>;
-    /// Time between two set-points of the controller, s.
-    fn period_s(&self) -> f64;
-    /// Takes a motion that follows all before it.
-    ///
-    /// # Errors
-    /// Why the arm cannot do it, at the motion's place.
-    fn perform(&mut self, motion: &Motion) -> Result<(), ScriptError>;
 }
 
 /// What a program tells its controller of the tool.

@@ -562,10 +562,6 @@ fn absurd_values_are_refused_by_name() {
         (speedj(Joints::zeros(), 0.0, None), "a is 0 rad/s^2"),
         (tool(bad), "the speed of the tool is NaN m/s"),
         (stopj(-1.0), "a is -1"),
-        (
-            motion(MotionKind::Stand { time_s: 1.0 }),
-            "a sleep is no motion",
-        ),
     ];
     for (what, expected) in cases {
         let mut cell = Cell::playing(0.002);

@@ -119,7 +119,10 @@ fn command(random: &mut SplitMix64, cell: &Cell) -> Command {
             deceleration: number(random, 0.1, 20.0),
             is_linear: random.below(2) == 0,
         }),
-        _ => motion(MotionKind::Stand { time_s: 1.0 }),
+        _ => motion(MotionKind::Stop {
+            deceleration: -1.0,
+            is_linear: false,
+        }),
     }
 }
 

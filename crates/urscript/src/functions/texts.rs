@@ -1,16 +1,12 @@
-//! Strings, lengths and messages.
+//! Strings and lengths.
 
 use std::rc::Rc;
 
 use crate::call::Call;
-use crate::machine::Machine;
 use crate::place::ScriptError;
 use crate::value::{Value, integer, text, whole};
 
 type Done = Result<Value, ScriptError>;
-
-/// Characters of a message that a note repeats.
-const MOST_OF_A_MESSAGE: usize = 80;
 
 fn made(call: &Call, new: &str) -> Done {
     text(new).map_err(|message| call.error(message))
@@ -44,33 +40,6 @@ pub(crate) fn number(call: &Call) -> Done {
         Ok(number) if number.is_finite() => Ok(Value::Number(number)),
         _ => Err(call.error("the string is no number")),
     }
-}
-
-fn said(call: &Call) -> String {
-    let all: Vec<String> = call
-        .values
-        .iter()
-        .flatten()
-        .take(2)
-        .map(Value::text)
-        .collect();
-    let all = all.concat();
-    let printable = all
-        .chars()
-        .map(|letter| if letter.is_control() { ' ' } else { letter });
-    printable.take(MOST_OF_A_MESSAGE).collect()
-}
-
-pub(crate) fn message(machine: &mut Machine<'_>, call: &Call) -> Done {
-    call.value(0)?;
-    machine.note(call.place, &format!("textmsg: {}", said(call)));
-    Ok(Value::Nothing)
-}
-
-pub(crate) fn popup(machine: &mut Machine<'_>, call: &Call) -> Done {
-    call.value(0)?;
-    machine.note(call.place, "popup answered at once");
-    Ok(Value::Nothing)
 }
 
 /// A position in a string, from 0.

@@ -4,6 +4,7 @@
 #[expect(dead_code, reason = "shared with the other tests")]
 mod test_arm;
 #[path = "../urscript/test_host.rs"]
+#[expect(dead_code, reason = "shared with the other tests")]
 mod test_host;
 
 use needlebench_urscript::{End, Program, Progress, Run};

@@ -1,9 +1,10 @@
 //! What programs do.
 
 use needlebench_kinematics::{Joints, Pose, pose_from_rotation_vector, rotation_angle_between};
-use needlebench_urscript::{Arm, Installation, Motion, MotionKind, evaluate, parse};
+use needlebench_urscript::{Motion, MotionKind};
 
-use crate::test_arm::{TestArm, done, start};
+use crate::test_arm::{TestArm, start};
+use crate::test_host::{TestHost, done};
 
 /// A hundred roundings of positions (m) and angles (rad) of order 1.
 const ROUNDING: f64 = 1e-14;
@@ -11,22 +12,17 @@ const ROUNDING: f64 = 1e-14;
 /// A hundred times the residual of the closed form.
 const IK: f64 = 1e-10;
 
-fn motions(text: &str) -> Vec<Motion> {
-    match done(text) {
-        Ok((_, motions)) => motions,
-        Err(error) => panic!("{error}\n{text}"),
-    }
+fn ran(text: &str) -> TestHost {
+    done(text, None).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
-/// The numbers that a program sends: each as the time of a `sleep`.
+fn motions(text: &str) -> Vec<Motion> {
+    ran(text).motions
+}
+
+/// The numbers that a program gives away by `out(NUMBER)`.
 fn numbers(text: &str) -> Vec<f64> {
-    motions(text)
-        .iter()
-        .map(|motion| match motion.kind {
-            MotionKind::Stand { time_s } => time_s,
-            ref other => panic!("{other:?}"),
-        })
-        .collect()
+    ran(&text.replace("out(", "write_output_float_register(0, ")).numbers
 }
 
 #[test]
@@ -53,7 +49,7 @@ fn expressions_are_worth_what_arithmetic_says() {
         ("get_steptime() * 500", 1.0),
         ("point_dist(p[0, 3, 0, 1, 0, 0], p[4, 0, 0, 0, 1, 0])", 5.0),
     ] {
-        let found = numbers(&format!("sleep({text})"));
+        let found = numbers(&format!("out({text})"));
         assert!(
             (found[0] - expected).abs() < 1e-12 * expected,
             "{text}: {found:?}"
@@ -74,7 +70,7 @@ fn expressions_are_worth_what_arithmetic_says() {
             false,
         ),
     ] {
-        let found = numbers(&format!("if {text}: sleep(1) else: sleep(2) end"));
+        let found = numbers(&format!("if {text}: out(1) else: out(2) end"));
         assert_eq!(found[0] < 1.5, expected, "{text}");
     }
 }
@@ -83,40 +79,40 @@ fn expressions_are_worth_what_arithmetic_says() {
 fn names_hold_where_the_language_says() {
     // A free name in a function is the global one if there is any, else its own.
     let text = "def program():\n  local a = 1\n  def f(x, y = 10):\n    a = a + x\n    b = y\n    local a = 100\n    \
-                return a + b\n  end\n  sleep(f(2))\n  sleep(f(2, y = 20))\n  sleep(a)\nend\n";
+                return a + b\n  end\n  out(f(2))\n  out(f(2, y = 20))\n  out(a)\nend\n";
     assert_eq!(numbers(text), [110.0, 120.0, 5.0]);
     // Lists are values.
-    let text = "a = [1, 2] b = a b[0] = 7 sleep(a[0]) sleep(b[0])";
+    let text = "a = [1, 2] b = a b[0] = 7 out(a[0]) out(b[0])";
     assert_eq!(numbers(text), [1.0, 7.0]);
-    let text = "def f(l): l[0] = 9 return l end a = [1, 2] b = f(a) sleep(a[0]) sleep(b[0])";
+    let text = "def f(l): l[0] = 9 return l end a = [1, 2] b = f(a) out(a[0]) out(b[0])";
     assert_eq!(numbers(text), [1.0, 9.0]);
-    let text = "m = [[1, 2], [3, 4]] m[1, 0] = 8 sleep(m[1][0]) q = p[1, 2, 3, 0, 0, 0] q[2] = 5 sleep(q[2])";
+    let text =
+        "m = [[1, 2], [3, 4]] m[1, 0] = 8 out(m[1][0]) q = p[1, 2, 3, 0, 0, 0] q[2] = 5 out(q[2])";
     assert_eq!(numbers(text), [8.0, 5.0]);
-    let text = "def f(): global g = 3 end f() sleep(g)";
+    let text = "def f(): global g = 3 end f() out(g)";
     assert_eq!(numbers(text), [3.0]);
 }
 
 #[test]
 fn branches_and_loops_go_on_as_written() {
     let text = "i = 0\nwhile True:\n  i = i + 1\n  if i == 2:\n    continue\n  elif i == 5:\n    break\n  end\n  \
-                sleep(i)\nend\n";
+                out(i)\nend\n";
     assert_eq!(numbers(text), [1.0, 3.0, 4.0]);
-    let text =
-        "def fib(n): if n < 2: return n end return fib(n - 1) + fib(n - 2) end sleep(fib(15))";
+    let text = "def fib(n): if n < 2: return n end return fib(n - 1) + fib(n - 2) end out(fib(15))";
     assert_eq!(numbers(text), [610.0]);
-    let text = "def stop(): halt end sleep(1) stop() sleep(2)";
+    let text = "def stop(): halt end out(1) stop() out(2)";
     assert_eq!(numbers(text), [1.0]);
 }
 
 #[test]
 fn what_the_program_is_is_found() {
     for text in [
-        "def main(): sleep(1) end",
-        "def main(): sleep(1) end main()",
-        "def f(x): sleep(x) end def main(): f(1) end main()",
-        "def f(x): sleep(x) end f(1)",
-        "sleep(1)",
-        "def main():\n def main(): sleep(1) end\n main()\nend",
+        "def main(): out(1) end",
+        "def main(): out(1) end main()",
+        "def f(x): out(x) end def main(): f(1) end main()",
+        "def f(x): out(x) end f(1)",
+        "out(1)",
+        "def main():\n def main(): out(1) end\n main()\nend",
     ] {
         assert_eq!(numbers(text), [1.0], "{text}");
     }
@@ -278,7 +274,7 @@ fn the_arm_is_where_the_last_motion_ends() {
 }
 
 #[test]
-fn the_graphical_editors_head_is_noted_and_its_counting_thread_not_run() {
+fn the_graphical_editors_head_is_carried_out() {
     let text = r#"def Needle():
   set_safety_mode_transition_hardness(1)
   set_gravity([0.0, 0.0, 9.82])
@@ -301,49 +297,26 @@ fn the_graphical_editors_head_is_noted_and_its_counting_thread_not_run() {
   set_standard_digital_out(0, True)
 end
 "#;
-    let (outcome, all) = done(text).unwrap();
-    assert_eq!(all.len(), 1);
-    assert_eq!(outcome.belief.payload_kg, Some(1.5));
-    assert_eq!(outcome.belief.centre_m, Some([0.0, 0.01, 0.05]));
-    assert_eq!(outcome.belief.gravity_m_s2, Some([0.0, 0.0, 9.82]));
-    assert_eq!(
-        outcome.notes,
-        [
-            "settings of the controller that are not simulated (lines 2, 6)",
-            "threads that only count are not run (line 14)",
-            "textmsg: there 0.2 (line 18)",
-            "popup answered at once (line 19)",
-            "outputs, which nothing here reads (line 20)",
-        ]
-    );
-}
-
-#[test]
-fn a_measured_posture_is_known_before_anything_moves() {
-    // As needlebench's own programs look before they begin.
-    let text = "def check():\n local q = get_actual_joint_positions()\n if norm(q[0] - 0.1) > 0.017:\n \
-                halt\n end\nend\n\
-                check()\nsleep(1)";
-    let (outcome, _) = done(text).unwrap();
-    assert_eq!(
-        outcome.notes,
-        ["get_actual_joint_positions is the start posture: nothing has moved yet (line 2)"]
-    );
+    let host = ran(text);
+    assert_eq!(host.motions.len(), 1);
+    assert_eq!(host.belief.payload_kg, Some(1.5));
+    assert_eq!(host.belief.centre_m, Some([0.0, 0.01, 0.05]));
+    assert_eq!(host.belief.gravity_m_s2, Some([0.0, 0.0, 9.82]));
+    let said = |part: &str| host.trace.iter().filter(|each| each.contains(part)).count();
+    assert_eq!(said("not simulated: settings of the controller"), 2);
+    assert_eq!((said("there 0.2"), said("popup Needle?")), (1, 1));
+    assert_eq!(said("DigitalOutput[0] = Truth(true)"), 1);
 }
 
 #[test]
 fn the_installations_tcp_counts_until_the_program_sets_one() {
     let text =
         "movel([0, -1, 1, -1, -1, 0]) set_tcp(p[0, 0, 0.3, 0, 0, 0]) movel([0, -1, 1, -1, -1, 0])";
-    let mut arm = TestArm::new();
     let installed = Pose::translation(0.0, 0.0, 0.1);
-    let installation = Installation {
-        flange_from_tcp: Some(installed),
-    };
-    evaluate(&parse(text).unwrap(), &mut arm, &installation).unwrap();
-    assert_eq!(arm.motions[0].flange_from_tcp, Some(installed));
+    let host = done(text, Some(installed)).unwrap();
+    assert_eq!(host.motions[0].flange_from_tcp, Some(installed));
     assert_eq!(
-        arm.motions[1].flange_from_tcp,
+        host.motions[1].flange_from_tcp,
         Some(Pose::translation(0.0, 0.0, 0.3))
     );
 }

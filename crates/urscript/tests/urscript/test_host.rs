@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use needlebench_kinematics::{Joints, Pose};
 use needlebench_urscript::{
-    Arm, ArmState, Bank, Belief, End, Host, Message, MotionKind, Place, Program, Progress, Request,
-    Run, Signal,
+    ArmState, Bank, Belief, End, Host, Message, Motion, MotionKind, Place, Program, Progress,
+    Request, Run, ScriptError, Signal,
 };
 
 use crate::test_arm::{TestArm, start};
@@ -23,6 +23,9 @@ pub struct TestHost {
     /// What came through the socket `s`, and what was sent; none where it is not there.
     pub socket: Option<Vec<u8>>,
     pub sent: Vec<u8>,
+    /// The moves, and the numbers written to registers.
+    pub motions: Vec<Motion>,
+    pub numbers: Vec<f64>,
     arm: TestArm,
     done_in: u32,
     goal: Joints,
@@ -54,6 +57,8 @@ impl TestHost {
             signals: BTreeMap::new(),
             socket: None,
             sent: Vec::new(),
+            motions: Vec::new(),
+            numbers: Vec::new(),
             arm: TestArm::new(),
             done_in: 0,
             goal: start(),
@@ -90,6 +95,23 @@ impl TestHost {
         }
         None
     }
+}
+
+/// What a program does on a controller whose TCP is as given.
+pub fn done(text: &str, flange_from_tcp: Option<Pose>) -> Result<TestHost, ScriptError> {
+    /// Far more than any of the programs here takes.
+    const MOST_CYCLES: u32 = 20_000;
+    let mut host = TestHost::new();
+    host.belief.flange_from_tcp = flange_from_tcp;
+    let mut run = Run::new(Program::load(text)?);
+    for _ in 0..MOST_CYCLES {
+        match host.step(&mut run) {
+            Progress::Ended(End::Exception(error)) => return Err(error),
+            Progress::Ended(_) => return Ok(host),
+            Progress::Running => {}
+        }
+    }
+    panic!("never ends: {text}")
 }
 
 fn cycles(time_s: f64) -> u32 {
@@ -137,6 +159,9 @@ impl Host for TestHost {
     }
 
     fn begin(&mut self, request: &Request, place: Place) -> Result<(), String> {
+        if let Request::Move(motion) = request {
+            self.motions.push(motion.clone());
+        }
         let (what, cycles, goal) = match request {
             Request::Move(motion) => match &motion.kind {
                 MotionKind::Joints { to, pace, .. } => {
@@ -182,6 +207,9 @@ impl Host for TestHost {
 
     fn write(&mut self, bank: Bank, index: usize, signal: Signal) {
         self.signals.insert((bank, index), signal);
+        if let Signal::Number(number) = signal {
+            self.numbers.push(number);
+        }
         self.note(format!("{bank:?}[{index}] = {signal:?}"));
     }
 
