@@ -1,5 +1,7 @@
 //! Failures of commands.
 
+use needlebench_bench::judge::JudgeError;
+use needlebench_bench::robot::RobotError;
 use needlebench_input::{Finding, nothing_serves};
 use needlebench_patient::Stop;
 use needlebench_study::StudyError;
@@ -121,6 +123,24 @@ impl From<Vec<Finding>> for Failure {
 impl From<anyhow::Error> for Failure {
     fn from(error: anyhow::Error) -> Self {
         Self::Environment(error)
+    }
+}
+
+impl From<JudgeError> for Failure {
+    fn from(error: JudgeError) -> Self {
+        match error {
+            JudgeError::Refused(finding) => (*finding).into(),
+            JudgeError::Run(error) => anyhow::Error::from(error).into(),
+        }
+    }
+}
+
+impl From<RobotError> for Failure {
+    fn from(error: RobotError) -> Self {
+        match error {
+            RobotError::Judge(error) => error.into(),
+            error @ RobotError::Engine { .. } => anyhow::Error::from(error).into(),
+        }
     }
 }
 

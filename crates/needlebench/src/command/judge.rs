@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use needlebench_bench::RunOptions;
 use needlebench_bench::judge::answers::{AnswersOptions, TOLERANCE, judge_answers};
 use needlebench_bench::judge::free::judge_free;
-use needlebench_bench::judge::{JudgeError, JudgeOptions, JudgedRun, judge as judge_motion};
+use needlebench_bench::judge::{JudgeOptions, JudgedRun, judge as judge_motion};
 use needlebench_bench::robot::{
     InstalledTcp, RobotOptions, TIME_LIMIT_S, Until, is_program, judge_program, program_motion,
 };
@@ -25,7 +25,6 @@ use needlebench_scenario::ResolvedScenario;
 use serde::Serialize;
 
 use super::results_folder::{ResultsFolder, probe_file};
-use super::robot::robot_failure;
 use super::run::{Outputs, put, tell_pipeline};
 use super::{load, overrides, print_json, print_text};
 use crate::arguments::{RobotArguments, RunningArguments};
@@ -287,7 +286,7 @@ fn judged(
     if is_program(path) {
         let asked = program_options(path, arguments)?;
         let done = judge_program(resolved, path, &asked, options, cancel, progress);
-        return done.map_err(robot_failure);
+        return Ok(done?);
     }
     let motion = read(path, arguments)?;
     let asked = JudgeOptions {
@@ -298,7 +297,7 @@ fn judged(
         nearest: false,
     };
     let done = judge_motion(resolved, &motion, &asked, options, cancel, progress);
-    done.map_err(judge_failure)
+    Ok(done?)
 }
 
 /// Judges clearances and joints alone.
@@ -311,11 +310,11 @@ fn free(
         let asked = program_options(path, arguments)?;
         let cancel = watch_interrupts()?;
         let options = arguments.running.options();
-        program_motion(resolved, path, &asked, &options, &cancel).map_err(robot_failure)?
+        program_motion(resolved, path, &asked, &options, &cancel)?
     } else {
         read(path, arguments)?
     };
-    let report = judge_free(resolved, &motion, between(arguments)).map_err(judge_failure)?;
+    let report = judge_free(resolved, &motion, between(arguments))?;
     let junit = free_junit(&report);
     let text = free_text(&report);
     told(arguments, &report, &text, report.verdict, junit)
@@ -344,7 +343,7 @@ fn answers(arguments: &JudgeArguments, resolved: &ResolvedScenario) -> Result<Ex
         tolerance: arguments.tolerance.unwrap_or(TOLERANCE),
         is_partial: arguments.partial,
     };
-    let report = judge_answers(resolved, &file, &options, &control).map_err(judge_failure)?;
+    let report = judge_answers(resolved, &file, &options, &control)?;
     let text = answers_text(&report, arguments.running.wide);
     let junit = answers_junit(&report);
     told(arguments, &report, &text, report.verdict, junit)
@@ -369,13 +368,6 @@ fn told(
         print_text(text.trim_end())?;
     }
     Ok(ExitStatus::of(verdict))
-}
-
-pub(super) fn judge_failure(error: JudgeError) -> Failure {
-    match error {
-        JudgeError::Refused(finding) => Failure::from(*finding),
-        JudgeError::Run(error) => anyhow::Error::from(error).into(),
-    }
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {

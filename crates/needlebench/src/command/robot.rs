@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use needlebench_bench::robot::{RobotError, RobotOptions, TIME_LIMIT_S, Until, judge_program};
+use needlebench_bench::robot::{RobotOptions, TIME_LIMIT_S, Until, judge_program};
 use needlebench_patient::ct::{LastScan, scanned};
 
-use super::judge::{AgainstArgument, TcpArgument, judge_failure};
+use super::judge::{AgainstArgument, TcpArgument};
 use super::results_folder::{ResultsFolder, probe_file};
 use super::run::{Outputs, put, tell_pipeline};
 use super::{load, overrides, print_json, print_text};
@@ -100,7 +100,7 @@ pub(crate) fn robot(arguments: &RobotCommandArguments) -> Result<ExitStatus, Fai
     let script = &arguments.script;
     let done = judge_program(&resolved, script, &asked, &options, &cancel, &progress);
     progress.finish();
-    let done = done.map_err(robot_failure)?;
+    let done = done?;
     let (status, report) = put(
         &done.resolved,
         &done.run,
@@ -115,13 +115,6 @@ pub(crate) fn robot(arguments: &RobotCommandArguments) -> Result<ExitStatus, Fai
     }
     tell_pipeline(&[&report], running.junit.as_deref())?;
     Ok(status)
-}
-
-pub(super) fn robot_failure(error: RobotError) -> Failure {
-    match error {
-        RobotError::Judge(error) => judge_failure(error),
-        error @ RobotError::Engine { .. } => anyhow::Error::from(error).into(),
-    }
 }
 
 fn until(text: &str) -> Result<Until, String> {

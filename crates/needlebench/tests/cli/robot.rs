@@ -149,7 +149,7 @@ fn exceptions_and_protective_stops_fail_at_their_place() {
         (
             "tcp.script",
             "def p():\n  x = get_actual_tcp_pose()\nend\n",
-            "line 2, column 7: get_actual_tcp_pose: no TCP is set",
+            "line 2, column 7: get_actual_tcp_pose: the program sets no TCP",
         ),
     ] {
         bench.write(name, text);
