@@ -88,6 +88,35 @@ impl Bend {
         interpolate(&self.fractions, &self.curves_m[index], fraction)
     }
 
+    /// Curves that differ so many times as much from their mean, or from the straight line where any turn is as likely.
+    pub(crate) fn larger(&self, factor: f64) -> Self {
+        let count = self.curves_m.len() as f64;
+        let middle = |station: usize| match self.direction {
+            BendDirection::Known { .. } => {
+                let all = self.curves_m.iter().map(|curve| curve[station]);
+                all.fold(Vector2::zeros(), |sum, each| sum + each) / count
+            }
+            BendDirection::Unknown => Vector2::zeros(),
+        };
+        let middle: Vec<Vector2<f64>> = (0..self.fractions.len()).map(middle).collect();
+        let curve = |curve: &Vec<Vector2<f64>>| {
+            let both = curve.iter().zip(&middle);
+            both.map(|(value, middle)| middle + (value - middle) * factor)
+                .collect()
+        };
+        // In their order: a larger normal variable is a larger bend of the same needle.
+        Self {
+            fractions: self.fractions.clone(),
+            curves_m: self.curves_m.iter().map(curve).collect(),
+            direction: match self.direction {
+                BendDirection::Known { spread_rad } => BendDirection::Known {
+                    spread_rad: spread_rad * factor,
+                },
+                BendDirection::Unknown => BendDirection::Unknown,
+            },
+        }
+    }
+
     /// Whether two draws can differ.
     pub(crate) fn has_spread(&self) -> bool {
         let is_turned = match self.direction {

@@ -71,6 +71,18 @@ impl Hold {
         })
     }
 
+    /// Level, drift about its mean and failed holds so many times as large.
+    pub(crate) fn larger(&self, factor: f64) -> Self {
+        let larger = |vectors: &[Vector3<f64>; 2]| vectors.map(|each| each * factor);
+        Self {
+            weight: self.weight,
+            level_sd_m: larger(&self.level_sd_m),
+            drift_m: self.drift_m,
+            drift_sd_m: larger(&self.drift_sd_m),
+            failed_m: self.failed_m.as_ref().map(larger),
+        }
+    }
+
     pub(crate) fn has_spread(&self) -> bool {
         let vectors = self.level_sd_m.iter().chain(&self.drift_sd_m);
         let mut all = vectors.chain(self.failed_m.iter().flatten());

@@ -132,6 +132,7 @@ pub struct Case<'a, A> {
 }
 
 /// Distances of the planned path from a structure.
+#[derive(Clone)]
 #[expect(clippy::struct_field_names, reason = "all are in metres")]
 pub(crate) struct Clearance {
     /// Of the path between two stations, a lower bound, m.
@@ -166,16 +167,7 @@ impl<'a, A: Anatomy> Case<'a, A> {
         }
         let fractions = stations(law, &needle);
         let tip = fractions.iter().position(|each| *each >= 1.0).unwrap_or(0);
-        let bends_m: Vec<Vector2<f64>> = law.bend().map_or_else(Vec::new, |bend| {
-            let curves = 0..bend.count();
-            curves
-                .flat_map(|curve| fractions.iter().map(move |each| bend.at(curve, *each)))
-                .collect()
-        });
-        let chords_m = bends_m
-            .chunks(fractions.len())
-            .map(|curve| off_chord_m(&fractions, curve))
-            .collect();
+        let (bends_m, chords_m) = bends(law, &fractions);
         let mut case = Self {
             law,
             needle,
@@ -192,6 +184,34 @@ impl<'a, A: Anatomy> Case<'a, A> {
             case.clearances.push(clearance);
         }
         Ok(case)
+    }
+
+    /// The same needle among the same structures under another law whose bend has the same fractions, with boundaries that
+    /// may be seen otherwise.
+    ///
+    /// # Errors
+    /// [`CaseError::Boundary`].
+    pub fn under<'b>(
+        &self,
+        law: &'b Law,
+        structures: &'b [Structure],
+    ) -> Result<Case<'b, A>, CaseError>
+    where
+        'a: 'b,
+    {
+        structures.iter().try_for_each(check_boundary)?;
+        let (bends_m, chords_m) = bends(law, &self.fractions);
+        Ok(Case {
+            law,
+            needle: self.needle,
+            structures,
+            anatomy: self.anatomy,
+            fractions: self.fractions.clone(),
+            tip: self.tip,
+            bends_m,
+            chords_m,
+            clearances: self.clearances.clone(),
+        })
     }
 
     /// A point of the planned axis.
@@ -214,13 +234,7 @@ impl<'a, A: Anatomy> Case<'a, A> {
         /// Of a slope, relative, and of a distance, m.
         const ROUNDING: (f64, f64) = (1e-6, 1e-9);
         let name = || structure.name.clone();
-        let sd_m = structure.boundary_sd_m;
-        if sd_m < 0.0 || !sd_m.is_finite() {
-            return Err(CaseError::Boundary {
-                structure: name(),
-                sd_m,
-            });
-        }
+        check_boundary(structure)?;
         let is_plane = |plane: &HalfPlane| {
             let [from_m, to_m] = plane.stretch_m;
             (plane.normal.norm() - 1.0).abs() < 1e-9 && from_m <= to_m && !plane.offset_m.is_nan()
@@ -315,6 +329,32 @@ impl<'a, A: Anatomy> Case<'a, A> {
         let ends = [0, last].map(|station| self.off_m(path, station, body).norm());
         ends[0].max(ends[1]) + self.chords_m.get(path.curve).copied().unwrap_or(0.0)
     }
+}
+
+fn check_boundary(structure: &Structure) -> Result<(), CaseError> {
+    let sd_m = structure.boundary_sd_m;
+    if sd_m < 0.0 || !sd_m.is_finite() {
+        return Err(CaseError::Boundary {
+            structure: structure.name.clone(),
+            sd_m,
+        });
+    }
+    Ok(())
+}
+
+/// Curves of the bend, station by station, and how far each is off its chord at most, m.
+fn bends(law: &Law, fractions: &[f64]) -> (Vec<Vector2<f64>>, Vec<f64>) {
+    let bends_m: Vec<Vector2<f64>> = law.bend().map_or_else(Vec::new, |bend| {
+        let curves = 0..bend.count();
+        curves
+            .flat_map(|curve| fractions.iter().map(move |each| bend.at(curve, *each)))
+            .collect()
+    });
+    let chords_m = bends_m
+        .chunks(fractions.len())
+        .map(|curve| off_chord_m(fractions, curve))
+        .collect();
+    (bends_m, chords_m)
 }
 
 /// Stations of a path: where curves have their values, entry, tip and end, and enough in between.

@@ -29,6 +29,18 @@ pub struct Law {
     breathes: bool,
 }
 
+/// Errors whose deviations are taken to be larger.
+pub struct Larger<'a> {
+    /// How many times as large.
+    pub factor: f64,
+    /// Whether a source of normal errors is, by its name.
+    pub part: &'a dyn Fn(&str) -> bool,
+    /// Whether the bend is: about its mean curve, or about the straight needle where its direction is not known.
+    pub bend: bool,
+    /// Whether the breath is: level, drift about its mean, and how far a failed hold moves.
+    pub breath: bool,
+}
+
 /// Of products of Jacobians, relative to the largest variance.
 const ROUNDING: f64 = 1e-9;
 
@@ -100,6 +112,48 @@ impl Law {
             holds,
             breathes,
         })
+    }
+
+    /// The same law with larger deviations; the mean of the normal errors stays.
+    ///
+    /// # Errors
+    /// [`LawError`], where they become too large.
+    pub fn with(&self, larger: &Larger<'_>) -> Result<Self, LawError> {
+        let Larger {
+            factor,
+            part: is_larger,
+            bend,
+            breath,
+        } = *larger;
+        let parts = self.parts.iter().map(|part| Part {
+            name: part.name.clone(),
+            covariance_m2: if is_larger(&part.name) {
+                part.covariance_m2 * factor.powi(2)
+            } else {
+                part.covariance_m2
+            },
+        });
+        let bends = self.bend.as_ref();
+        let holds = if self.breathes {
+            self.holds.clone()
+        } else {
+            Vec::new()
+        };
+        let holds = holds.into_iter();
+        Self::new(
+            self.mean_m,
+            parts.collect(),
+            bends.map(|own| {
+                if bend {
+                    own.larger(factor)
+                } else {
+                    own.clone()
+                }
+            }),
+            holds
+                .map(|own| if breath { own.larger(factor) } else { own })
+                .collect(),
+        )
     }
 
     /// Mean of (entry x, y, z, tip x, y, z), m: of the normal errors alone.

@@ -55,6 +55,6 @@ pub use influence::{Influence, Origin};
 pub use interval::{
     CONFIDENCE, Difference, Interval, LEAST_PRINTED, share_interval, weighted_interval,
 };
-pub use law::{Law, Part};
+pub use law::{Larger, Law, Part};
 pub use planes::HalfPlane;
 pub use words::{bound_label, estimate_label};
