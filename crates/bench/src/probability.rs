@@ -2,18 +2,20 @@
 
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use needlebench_evaluation::probability::{
-    EventProbability, LesionProbability, ProbabilityReport, StructureProbability,
+    ASSUMED_LARGER, EventProbability, LargerProbability, LesionProbability, ProbabilityReport,
+    StructureProbability,
 };
 use needlebench_geometry::PreparedSolids;
 use needlebench_kinematics::Pose;
 use needlebench_phantom::{Phantom, Tissue};
 use needlebench_planning::{GoalPlan, NeedleStructure, needle_structures};
 use needlebench_probability::{
-    Anatomy, Body, Bound, BoundKind, Case, Draws, Estimate, Event, HalfPlane, LEAST_PRINTED, Law,
-    Needle, Origin, Structure, Told, at_most, bound_label, estimate, estimate_label,
+    Anatomy, Body, Bound, BoundKind, Case, Draws, Estimate, Event, HalfPlane, LEAST_PRINTED,
+    Larger, Law, Needle, Origin, Structure, Told, at_most, bound_label, estimate, estimate_label,
 };
 use needlebench_scenario::imperfections::Imperfections;
 use needlebench_scenario::{Goal, ResolvedScenario};
+use needlebench_uncertainty::Source;
 use needlebench_uncertainty::budget::{BudgetCase, path_law};
 
 use crate::budgets::{measured_and_assumed, of_each};
@@ -276,6 +278,17 @@ impl<'a> Surroundings<'a> {
         })
     }
 
+    /// The structures with boundaries that are seen less well, as none of them is measured.
+    fn boundaries_larger(&self) -> Vec<Structure> {
+        let structures = self.structures.iter().cloned();
+        structures
+            .map(|structure| Structure {
+                boundary_sd_m: structure.boundary_sd_m * ASSUMED_LARGER,
+                ..structure
+            })
+            .collect()
+    }
+
     /// Probabilities of a configuration's needle.
     ///
     /// # Errors
@@ -324,12 +337,24 @@ impl<'a> Surroundings<'a> {
         events.push(inside(count + 2));
         events.extend(self.lesion.iter().map(|_| inside(count + 3)));
         let found = estimate(&about, &events, draws).map_err(|error| error.to_string())?;
+        let law_larger = assumed_larger(&law, case.imperfections)?;
+        let seen_larger = self.boundaries_larger();
+        let under = about
+            .under(&law_larger, &seen_larger)
+            .map_err(|error| error.to_string())?;
+        let larger = estimate(&under, &events, draws).map_err(|error| error.to_string())?;
+        let found: Vec<[Estimate; 2]> = found
+            .into_iter()
+            .zip(larger)
+            .map(|both| both.into())
+            .collect();
         let (of_structures, others) = found.split_at(told.len());
         let [any, within_2_mm, in_lesion @ ..] = others else {
             return Err("estimates are missing".to_owned());
         };
-        let report =
-            |estimate: &Estimate, at_most: Option<f64>| event_report(estimate, at_most, &law);
+        let report = |estimates: &[Estimate; 2], at_most: Option<f64>| {
+            event_report(estimates, at_most, &law)
+        };
         let mut structures: Vec<StructureProbability> = Vec::new();
         for (index, estimate) in told.iter().copied().zip(of_structures) {
             let (obstacle, distance_m) = &self.near[index];
@@ -380,7 +405,13 @@ impl<'a> Surroundings<'a> {
     }
 }
 
-fn event_report(estimate: &Estimate, at_most: Option<f64>, law: &Law) -> EventProbability {
+/// Of an estimate, and of that with the assumed deviations larger.
+fn event_report(
+    [estimate, larger]: &[Estimate; 2],
+    at_most: Option<f64>,
+    law: &Law,
+) -> EventProbability {
+    let is_drawn = |estimate: &&Estimate| estimate.told != Told::AtPlan;
     let mostly = estimate.influences.first().map(|first| match first.origin {
         Origin::Part(index) => law.parts()[index].name.clone(),
         Origin::Level => "level of the held breath".to_owned(),
@@ -397,6 +428,13 @@ fn event_report(estimate: &Estimate, at_most: Option<f64>, law: &Law) -> EventPr
         at_most,
         of_1000: estimate_label(estimate),
         at_most_of_1000: at_most.map(bound_label),
+        assumed_larger: Some(larger)
+            .filter(is_drawn)
+            .map(|larger| LargerProbability {
+                probability: larger.probability,
+                interval_95: [larger.interval.low, larger.interval.high],
+                of_1000: estimate_label(larger),
+            }),
         mostly,
         draws: estimate.draws,
     }
@@ -512,6 +550,19 @@ fn body_of(tissue: Tissue, parts: &[Vec<Point3<f64>>], phantom: &Phantom) -> Bod
         }
     };
     if is_inner { Body::Lung } else { Body::Wall }
+}
+
+/// The law with the deviations of what was not measured larger.
+fn assumed_larger(law: &Law, imperfections: &Imperfections) -> Result<Law, String> {
+    let (_, assumed) = measured_and_assumed(imperfections);
+    let is_assumed = |source: Source| assumed.contains(&source);
+    let larger = Larger {
+        factor: ASSUMED_LARGER,
+        part: &|name| assumed.iter().any(|source| source.name() == name),
+        bend: is_assumed(Source::Needle),
+        breath: is_assumed(Source::Breathing),
+    };
+    law.with(&larger).map_err(|error| error.to_string())
 }
 
 /// What of the model was not measured.

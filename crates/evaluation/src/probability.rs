@@ -74,11 +74,28 @@ pub struct EventProbability {
     /// The bound, in words: `at most 14`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_most_of_1000: Option<String>,
+    /// The same with the deviations of what is assumed [`ASSUMED_LARGER`] times as large; none where nothing is drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assumed_larger: Option<LargerProbability>,
     /// The source whose halved variance changes the estimate most; none without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mostly: Option<String>,
     /// Draws of the estimate.
     pub draws: u64,
+}
+
+/// How many times as large the deviations of what is assumed are in the second column.
+pub const ASSUMED_LARGER: f64 = 1.5;
+
+/// How likely an event is under larger deviations.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LargerProbability {
+    /// The estimate; none where no draw has it.
+    pub probability: Option<f64>,
+    /// Its 95 % interval.
+    pub interval_95: [f64; 2],
+    /// Needles of 1000, in words.
+    pub of_1000: String,
 }
 
 impl ProbabilityReport {

@@ -187,6 +187,8 @@ pub(crate) struct Asked<'a, 'c, A> {
     reach_m: [Option<f64>; 2],
     /// Points of the path relative to each body, and how far they are off, once they are needed.
     points: [Vec<(Point3<f64>, f64)>; 2],
+    /// Whether the path is closer to a structure than a margin, as far as it was asked: of any is asked again.
+    closer: Vec<Option<(f64, bool)>>,
     /// A distance that is not a number.
     pub broken: Option<usize>,
 }
@@ -205,6 +207,7 @@ impl<'a, 'c, A: Anatomy> Asked<'a, 'c, A> {
             shifts,
             reach_m: [None; 2],
             points: [const { Vec::new() }; 2],
+            closer: vec![None; case.structures.len()],
             broken: None,
         }
     }
@@ -217,6 +220,7 @@ impl<'a, 'c, A: Anatomy> Asked<'a, 'c, A> {
         for points in &mut self.points {
             points.clear();
         }
+        self.closer.fill(None);
     }
 
     fn reach_m(&mut self, body: Body) -> f64 {
@@ -292,6 +296,15 @@ impl<'a, 'c, A: Anatomy> Asked<'a, 'c, A> {
     }
 
     fn is_closer(&mut self, structure: usize, margin_m: f64) -> bool {
+        if let Some((_, closer)) = self.closer[structure].filter(|known| known.0 == margin_m) {
+            return closer;
+        }
+        let closer = self.comes_closer(structure, margin_m);
+        self.closer[structure] = Some((margin_m, closer));
+        closer
+    }
+
+    fn comes_closer(&mut self, structure: usize, margin_m: f64) -> bool {
         let case = self.case;
         let Structures {
             body,

@@ -14,6 +14,7 @@ pub fn event(
         interval_95,
         at_most,
         of_1000: "so many".to_owned(),
+        assumed_larger: None,
         at_most_of_1000: at_most.map(|_| "at most so many".to_owned()),
         mostly: None,
         draws: 10_000,

@@ -1,7 +1,7 @@
 //! How likely the needle meets what, and reaches the lesion: counts of 1000 needles by the error model.
 
 use needlebench_cell::part_in_words;
-use needlebench_evaluation::probability::{EventProbability, ProbabilityReport};
+use needlebench_evaluation::probability::{ASSUMED_LARGER, EventProbability, ProbabilityReport};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 use needlebench_show::Block;
 
@@ -34,6 +34,20 @@ pub(crate) fn probability_in_words(goal: &GoalReport) -> Option<String> {
             all.margin_m * 1e3
         ));
     }
+    let wanted = match &all.in_lesion {
+        Some(lesion) => &lesion.event,
+        None => &all.within_2_mm,
+    };
+    let larger = [Some(wanted), all.any.as_ref()].into_iter().flatten();
+    let larger: Vec<&str> = larger
+        .filter_map(|event| Some(event.assumed_larger.as_ref()?.of_1000.as_str()))
+        .collect();
+    if !larger.is_empty() {
+        parts.push(format!(
+            "with the assumed errors {ASSUMED_LARGER} times as large {}",
+            larger.join(" and ")
+        ));
+    }
     Some(format!(
         "of 1000 needles by this model ({}, assumed: {}): {}",
         configuration.label,
@@ -54,6 +68,12 @@ fn chosen(goal: &GoalReport) -> Option<(&ConfigurationReport, &ProbabilityReport
     recommended.or_else(|| known().next())
 }
 
+/// The same with the assumed errors larger.
+fn with_larger(event: &EventProbability) -> String {
+    let larger = event.assumed_larger.as_ref();
+    larger.map_or_else(|| "-".to_owned(), |larger| larger.of_1000.clone())
+}
+
 /// All configurations, and the structures of the one that is recommended.
 pub(crate) fn probability_blocks(goal: &GoalReport) -> Vec<Block> {
     let Some((configuration, all)) = chosen(goal) else {
@@ -68,6 +88,7 @@ pub(crate) fn probability_blocks(goal: &GoalReport) -> Vec<Block> {
         Some(vec![
             each.label.to_owned(),
             lesion.map_or_else(dash, |lesion| lesion.event.of_1000.clone()),
+            lesion.map_or_else(dash, |lesion| with_larger(&lesion.event)),
             all.within_2_mm.of_1000.clone(),
             any.map_or_else(dash, |any| any.of_1000.clone()),
             any.and_then(|any| any.at_most_of_1000.clone())
@@ -83,6 +104,7 @@ pub(crate) fn probability_blocks(goal: &GoalReport) -> Vec<Block> {
             what,
             distance_m.map_or_else(dash, |distance_m| format!("{:.1}", distance_m * 1e3)),
             event.of_1000.clone(),
+            with_larger(event),
             event.at_most_of_1000.clone().unwrap_or_else(dash),
             event.mostly.clone().unwrap_or_else(dash),
         ]
@@ -119,6 +141,7 @@ pub(crate) fn probability_blocks(goal: &GoalReport) -> Vec<Block> {
             [
                 "configuration",
                 "tip in the lesion",
+                "assumed errors x 1.5",
                 "within 2 mm",
                 "close to a structure",
                 "bound",
@@ -131,6 +154,7 @@ pub(crate) fn probability_blocks(goal: &GoalReport) -> Vec<Block> {
                 configuration.label,
                 "distance (mm)",
                 "of 1000 needles",
+                "assumed errors x 1.5",
                 "bound",
                 "mostly",
             ],

@@ -278,10 +278,12 @@ NB.sections = /** @type {RunSections} */ (
       const with_ = /** @type {WithProbability[]} */ (goal.configurations.filter((c) => c.probability));
       if (!with_.length) return null;
       const dash = '\u2013';
+      const larger = 'Assumed errors \u00d7 1.5';
       /** @type {Column<WithProbability>[]} */
       const columns = [
         { title: 'Configuration', cell: (c) => c.label },
         { title: 'Tip in the lesion', numeric: true, cell: (c) => c.probability.in_lesion?.of_1000 ?? dash },
+        { title: larger, numeric: true, cell: (c) => c.probability.in_lesion?.assumed_larger?.of_1000 ?? dash },
         { title: 'Tip within 2 mm of the target', numeric: true, cell: (c) => c.probability.within_2_mm.of_1000 },
         { title: 'Close to a structure', numeric: true, cell: (c) => c.probability.any?.of_1000 ?? dash },
         { title: 'Upper bound', numeric: true, cell: (c) => c.probability.any?.at_most_of_1000 ?? dash },
@@ -300,6 +302,7 @@ NB.sections = /** @type {RunSections} */ (
         { title: 'Tissue', cell: (each) => each.tissue },
         { title: 'Distance', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.distance_m, 1) },
         { title: 'Of 1000 needles', numeric: true, cell: (each) => each.of_1000 },
+        { title: larger, numeric: true, cell: (each) => each.assumed_larger?.of_1000 ?? dash },
         { title: 'Upper bound', numeric: true, cell: (each) => each.at_most_of_1000 ?? dash },
         { title: 'Mostly', cell: (each) => (each.mostly ? NB.words(each.mostly) : dash) },
       ];

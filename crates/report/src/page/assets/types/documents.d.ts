@@ -286,6 +286,7 @@ interface EventProbability {
   probability: number | null;
   of_1000: string;
   at_most_of_1000?: string;
+  assumed_larger?: { of_1000: string };
   mostly?: string;
 }
 
