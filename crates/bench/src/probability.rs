@@ -1,5 +1,7 @@
 //! How likely a configuration's needle comes too close to structures, and its tip is in the lesion.
 
+use std::cell::OnceCell;
+
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use needlebench_evaluation::probability::{
     ASSUMED_LARGER, EventProbability, LargerProbability, LesionProbability, ProbabilityReport,
@@ -7,14 +9,14 @@ use needlebench_evaluation::probability::{
 };
 use needlebench_geometry::PreparedSolids;
 use needlebench_kinematics::Pose;
-use needlebench_phantom::{Phantom, Tissue};
+use needlebench_phantom::{Lesion, Phantom, Tissue};
 use needlebench_planning::{GoalPlan, NeedleStructure, needle_structures};
 use needlebench_probability::{
     Anatomy, Body, Bound, BoundKind, Case, Draws, Estimate, Event, HalfPlane, LEAST_PRINTED,
     Larger, Law, Needle, Origin, Structure, Told, at_most, bound_label, estimate, estimate_label,
 };
 use needlebench_scenario::imperfections::Imperfections;
-use needlebench_scenario::{Goal, ResolvedScenario};
+use needlebench_scenario::{Goal, PlacedPhantom, ResolvedScenario};
 use needlebench_uncertainty::Source;
 use needlebench_uncertainty::budget::{BudgetCase, path_law};
 
@@ -41,6 +43,9 @@ const FAR: f64 = 8.0;
 /// Most draws of an estimate.
 const DRAWS: u64 = 100_000;
 
+/// Draws of the lesion alone: of many configurations that are compared.
+const LESION_DRAWS: u64 = 10_000;
+
 /// Triangles of surfaces are cut until no edge is longer, m.
 const EDGE_M: f64 = 5e-3;
 
@@ -65,14 +70,9 @@ pub(crate) fn probabilities(
     let resolved = setup.resolved;
     let goals = resolved.goals.iter();
     let goals: Vec<Option<Surroundings<'_>>> = goals
-        .map(|goal| Surroundings::new(resolved, goal))
+        .map(|goal| Surroundings::new(resolved, goal, Extent::All))
         .collect();
-    let draws = Draws {
-        seed: resolved.scenario.seed,
-        most: DRAWS,
-        threads: 1,
-        moves: false,
-    };
+    let draws = Extent::All.draws(resolved);
     let found = of_each(setup, plans, threads, |goal, case| {
         Some(goals[goal].as_ref()?.of(case, &draws))
     });
@@ -80,8 +80,72 @@ pub(crate) fn probabilities(
     found.into_iter().map(flat).collect()
 }
 
+/// What probabilities are told of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Extent {
+    /// Lesion and structures, as of a run.
+    All,
+    /// The lesion, by few draws; no structure is looked at.
+    Lesion,
+}
+
+impl Extent {
+    /// The draws of a scenario's needles.
+    fn draws(self, resolved: &ResolvedScenario) -> Draws {
+        Draws {
+            seed: resolved.scenario.seed,
+            most: match self {
+                Self::All => DRAWS,
+                Self::Lesion => LESION_DRAWS,
+            },
+            threads: 1,
+            moves: false,
+        }
+    }
+}
+
+/// Probabilities of several configurations of one goal: what is about the needle is prepared once, at the first of them.
+pub(crate) struct GoalProbabilities<'a> {
+    resolved: &'a ResolvedScenario,
+    goal: &'a Goal,
+    extent: Extent,
+    around: OnceCell<Option<Surroundings<'a>>>,
+}
+
+impl<'a> GoalProbabilities<'a> {
+    pub fn new(resolved: &'a ResolvedScenario, goal: &'a Goal, extent: Extent) -> Self {
+        Self {
+            resolved,
+            goal,
+            extent,
+            around: OnceCell::new(),
+        }
+    }
+
+    /// Of a configuration; none without a patient.
+    ///
+    /// # Errors
+    /// A sentence.
+    pub fn of(&self, case: &BudgetCase<'_>) -> Option<Result<ProbabilityReport, String>> {
+        let prepare = || Surroundings::new(self.resolved, self.goal, self.extent);
+        let around = self.around.get_or_init(prepare).as_ref()?;
+        Some(around.of(case, &self.extent.draws(self.resolved)))
+    }
+}
+
+/// The lesion that a goal's target is in.
+pub(crate) fn lesion_at<'a>(placed: &'a PlacedPhantom, goal: &Goal) -> Option<&'a Lesion> {
+    let place = placed.world_from_phantom.inverse() * goal.target_m;
+    let mut lesions = placed.phantom.lesions.iter();
+    lesions.find(|lesion| match &goal.lesion {
+        Some(name) => lesion.name == *name,
+        None => (place - lesion.center_m).norm() < 0.5 * lesion.diameter_m,
+    })
+}
+
 /// What is about a goal's needle: the same for all configurations.
 struct Surroundings<'a> {
+    extent: Extent,
     /// Structures that are near, with their distances from the planned needle's surface, m.
     near: Vec<(NeedleStructure<'a>, f64)>,
     /// How many others there are.
@@ -169,7 +233,7 @@ fn world_from_needle(goal: &Goal, entry: &Point3<f64>) -> Pose {
 
 impl<'a> Surroundings<'a> {
     /// None for a goal without a patient.
-    fn new(resolved: &'a ResolvedScenario, goal: &'a Goal) -> Option<Self> {
+    fn new(resolved: &'a ResolvedScenario, goal: &'a Goal, extent: Extent) -> Option<Self> {
         let placed = resolved.phantom.as_ref()?;
         let phantom = &placed.phantom;
         let solids = &phantom.route_obstacles().solids;
@@ -220,7 +284,7 @@ impl<'a> Surroundings<'a> {
         let mut near = Vec::new();
         let mut others = 0;
         for (obstacle, distance_m) in all {
-            if distance_m >= farthest_m {
+            if extent == Extent::Lesion || distance_m >= farthest_m {
                 others += 1;
                 continue;
             }
@@ -252,19 +316,14 @@ impl<'a> Surroundings<'a> {
         }
         let target = Place::Ball(needle_from_world * goal.target_m, POINT_M);
         add("target", Body::Lung, 0.0, Vec::new(), target);
-        let place = placed.world_from_phantom.inverse() * goal.target_m;
-        let mut lesions = phantom.lesions.iter();
-        let lesion = lesions.find(|lesion| match &goal.lesion {
-            Some(name) => lesion.name == *name,
-            None => (place - lesion.center_m).norm() < 0.5 * lesion.diameter_m,
-        });
-        let lesion = lesion.map(|lesion| {
+        let lesion = lesion_at(placed, goal).map(|lesion| {
             let middle = needle_from_world * (placed.world_from_phantom * lesion.center_m);
             let place = Place::Ball(middle, 0.5 * lesion.diameter_m);
             add(&lesion.name, Body::Lung, seen.soft_m, Vec::new(), place);
             (lesion.name.clone(), lesion.diameter_m)
         });
         Some(Self {
+            extent,
             near,
             others,
             structures,
@@ -399,7 +458,11 @@ impl<'a> Surroundings<'a> {
             structures,
             margin_m: MARGIN_M,
             others: self.others + left.len(),
-            others_at_most: sum(&[left, vec![count, count + 1]].concat()),
+            others_at_most: match self.extent {
+                Extent::All => sum(&[left, vec![count, count + 1]].concat()),
+                // Nothing is known of what was not looked at.
+                Extent::Lesion => 1.0,
+            },
             assumed: assumed(case.imperfections),
         })
     }
@@ -662,7 +725,7 @@ mod tests {
             threads: 1,
             moves: false,
         };
-        let around = Surroundings::new(&resolved, &resolved.goals[0]).unwrap();
+        let around = Surroundings::new(&resolved, &resolved.goals[0], Extent::All).unwrap();
         let found = around.of(&case, &draws).unwrap();
         let first = &found.structures[0];
         let [close, within] = shares(&resolved, motion, &first.structure);

@@ -200,7 +200,7 @@ pub fn check_configuration(
         judged.results.extend(of_envelope);
     }
     for checked in others {
-        let is_probability = checked.metric.key.ends_with("_probability");
+        let is_probability = checked.metric.is_probability;
         judged.add(result(checked), || {
             let budget = configuration.budget_failure.as_ref();
             let budget = budget.map(|failure| format!("no error budget: {failure}"));
@@ -210,7 +210,9 @@ pub fn check_configuration(
         });
     }
     if let Some(probability) = &configuration.probability {
-        for (key, reason) in probability.undecided(criteria) {
+        let decided = criteria_with_limits(criteria, mode);
+        let open = probability.undecided(criteria).into_iter();
+        for (key, reason) in open.filter(|(key, _)| decided.contains(key)) {
             judged.set_open(missing(None, key, reason));
         }
     }

@@ -61,6 +61,7 @@ fn main() {
                 margin_mm: margins.map(f64::from).fold(f64::NEG_INFINITY, f64::max),
                 works: case.rows.iter().any(|row| row.outcome == Outcome::Ok),
                 tip_error_mm: None,
+                lesion_probability: None,
             });
         })
         .expect("a sound table");

@@ -2,6 +2,7 @@
 
 use needlebench_patient::ct::{LastScan, scanned};
 use needlebench_scenario::study::StudyMode;
+use needlebench_scenario::study::search::ObjectiveName;
 use needlebench_study::search::GenerationDesign;
 use needlebench_study::{CaseDesign as _, CaseError, CaseEvaluator, CaseResult, CaseWorker};
 
@@ -21,7 +22,8 @@ impl CaseEvaluator for GenerationEvaluator<'_> {
         Box::new(Worker {
             of: self,
             postures: StaticWorker::counting(counted_classes(&self.search.study))
-                .expecting_tip(self.search.expects_tip()),
+                .expecting_tip(self.search.expects(ObjectiveName::TipError))
+                .asking(self.search.likely()),
             scan: LastScan::default(),
         })
     }

@@ -2,7 +2,7 @@
 
 use needlebench_input::{Finding, sha256_hex};
 use needlebench_scenario::study::search::{ObjectiveName, SearchSection};
-use needlebench_scenario::study::{FactorValues, ResolvedStudy, StudyMode};
+use needlebench_scenario::study::{ResolvedStudy, StudyMode};
 use needlebench_study::search::{
     Candidate, Generation, GenerationDesign, Objective, SearchError, SearchPlan, SearchSpace,
     SpaceError, Stream,
@@ -10,8 +10,9 @@ use needlebench_study::search::{
 use needlebench_study::{Factor, FactorKind, FactorValue, Level, Manifest, Role, Shard};
 use serde_json::json;
 
+use crate::probability::lesion_at;
 use crate::provenance::{SOURCE_SHA256, arithmetic};
-use crate::study::{Identity, StudyColumns};
+use crate::study::{Identity, Likely, StudyColumns, has_imperfections, has_spread, sets};
 
 /// Layouts that candidates may be compared on; fewer give no significant differences.
 const SAMPLES_RANGE: std::ops::RangeInclusive<u64> = 16..=1_000_000;
@@ -66,16 +67,7 @@ impl PreparedSearch {
                     ),
             ]);
         }
-        if expects_tip(&section) && !has_imperfections(&study) {
-            return Err(vec![
-                Finding::new(
-                    &study.source.file,
-                    "`tip_error` is an RMS over arms and patients, which this scenario does not define",
-                )
-                .key("search.objective")
-                .hint("define them in [imperfections] of the scenario, or search by `margin` or `rate`"),
-            ]);
-        }
+        check_objectives(&study, &section)?;
         let space = SearchSpace::new(&study, samples)
             .map_err(|error| vec![space_finding(&study, &error)])?;
         let named = |name| Objective::named(name, section.quantile, section.failure_penalty_mm);
@@ -102,6 +94,11 @@ impl PreparedSearch {
             .map_err(|error: SearchError<()>| vec![plan_finding(&study, &error)])?;
         let identity = Identity::new(&study)?;
         let columns = StudyColumns::new(&[StudyMode::Static], &[]).with_margin();
+        let columns = if expects(&section, ObjectiveName::LesionProbability) {
+            columns.with_lesion_probability_alone()
+        } else {
+            columns.without_probabilities()
+        };
         Ok(Self {
             study,
             section,
@@ -112,9 +109,18 @@ impl PreparedSearch {
         })
     }
 
-    /// Whether the RMS tip error is an objective.
-    pub(crate) fn expects_tip(&self) -> bool {
-        expects_tip(&self.section)
+    /// Whether this is an objective.
+    pub(crate) fn expects(&self, objective: ObjectiveName) -> bool {
+        expects(&self.section, objective)
+    }
+
+    /// Which probabilities cases have.
+    pub(crate) fn likely(&self) -> Likely {
+        if self.expects(ObjectiveName::LesionProbability) {
+            Likely::Lesion
+        } else {
+            Likely::AsJudged
+        }
     }
 
     /// Cases of an exhaustive grid of candidates and layouts; none with ranges.
@@ -202,21 +208,73 @@ impl PreparedSearch {
     }
 }
 
-fn expects_tip(section: &SearchSection) -> bool {
-    let second = section.second_objective;
-    section.objective == ObjectiveName::TipError || second == Some(ObjectiveName::TipError)
+fn expects(section: &SearchSection, objective: ObjectiveName) -> bool {
+    section.objective == objective || section.second_objective == Some(objective)
 }
 
-/// Whether the scenario or a factor defines an arm and patient population.
-fn has_imperfections(study: &ResolvedStudy) -> bool {
-    study.family.base().expected.is_some()
-        || study.factors.iter().any(|factor| match &factor.values {
-            FactorValues::Continuum { .. } => false,
-            FactorValues::Levels(levels) => levels
-                .iter()
-                .flat_map(|level| &level.changes)
-                .any(|(key, _)| key.to_string().starts_with("imperfections")),
-        })
+/// What keeps a scenario from having the objectives.
+fn check_objectives(study: &ResolvedStudy, section: &SearchSection) -> Result<(), Vec<Finding>> {
+    let named = |objective: ObjectiveName| {
+        if section.objective == objective {
+            "search.objective"
+        } else {
+            "search.second_objective"
+        }
+    };
+    let finding = |objective: ObjectiveName, message: String| {
+        Finding::new(&study.source.file, message).key(named(objective))
+    };
+    let of_population = [
+        (ObjectiveName::TipError, "an RMS", has_imperfections(study)),
+        (
+            ObjectiveName::LesionProbability,
+            "a probability",
+            has_spread(study),
+        ),
+    ];
+    for (objective, what, is_defined) in of_population {
+        if expects(section, objective) && !is_defined {
+            let message = format!(
+                "`{}` is {what} over arms and patients, which this scenario does not define",
+                objective.name()
+            );
+            return Err(vec![finding(objective, message).hint(
+                "define them in [imperfections] of the scenario, or search by `margin` or `rate`",
+            )]);
+        }
+    }
+    let objective = ObjectiveName::LesionProbability;
+    if expects(section, objective)
+        && let Some(goal) = goal_without_lesion(study)
+    {
+        let message = format!(
+            "`lesion_probability` needs targets in lesions; goal `{goal}` has its target in none"
+        );
+        return Err(vec![finding(objective, message).hint(
+            "name a `lesion` of the phantom in the goal, select other `goals`, or search by another objective",
+        )]);
+    }
+    Ok(())
+}
+
+/// The first goal of a study whose target is in no lesion of the base scenario; none where a factor sets phantoms or targets,
+/// or a scan has them.
+fn goal_without_lesion(study: &ResolvedStudy) -> Option<&str> {
+    let base = study.family.base();
+    let is_varied = ["phantom.model", "goal.", "goals", "ct"]
+        .iter()
+        .any(|start| sets(study, start));
+    if base.scenario.ct.is_some() || is_varied {
+        return None;
+    }
+    let is_in_none = |name: &&String| {
+        let goal = base.goals.iter().find(|goal| goal.name == **name);
+        let lesion = goal
+            .zip(base.phantom.as_ref())
+            .and_then(|(goal, placed)| lesion_at(placed, goal));
+        lesion.is_none()
+    };
+    study.goals.iter().find(is_in_none).map(String::as_str)
 }
 
 fn grid_cases(space: &SearchSpace, samples: u64) -> Option<u64> {

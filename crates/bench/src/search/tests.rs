@@ -2,15 +2,20 @@
 
 use std::path::Path;
 
+use needlebench_input::Finding;
 use needlebench_scenario::Overrides;
 use needlebench_scenario::study::load_study;
-use needlebench_study::search::{Generation, GenerationDesign, Purpose, Stream};
-use needlebench_study::{CaseEvaluator as _, Outcome};
+use needlebench_study::search::{Generation, GenerationDesign, Objective, Purpose, Stream};
+use needlebench_study::{CaseDesign as _, CaseEvaluator as _, Outcome};
 
 use super::*;
-use crate::study::MARGIN_COLUMN;
+use crate::study::{Likely, MARGIN_COLUMN, StaticWorker, StudyCase};
 
 fn prepared(text: &str) -> PreparedSearch {
+    try_prepared(text).unwrap()
+}
+
+fn try_prepared(text: &str) -> Result<PreparedSearch, Vec<Finding>> {
     let studies = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/studies");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("search.toml");
@@ -18,7 +23,7 @@ fn prepared(text: &str) -> PreparedSearch {
     let text = text.replace("CHEST", &scenario.display().to_string());
     std::fs::write(&path, text).unwrap();
     let study = load_study(&path, &Overrides::default()).unwrap();
-    PreparedSearch::new(study).unwrap()
+    PreparedSearch::new(study)
 }
 
 const BASES: &str = r#"
@@ -151,4 +156,82 @@ fn what_nothing_can_be_chosen_from_says_what_is_missing() {
         "{findings:?}"
     );
     assert!(findings[0].hint.as_ref().unwrap().contains("role"));
+}
+
+/// The lesion of a search is told by fewer needles than that of a study, and is the same lesion.
+#[test]
+fn lesion_probabilities_of_a_search_are_those_of_a_study() {
+    let text =
+        format!("{BASES}[search]\nobjective = \"lesion_probability\"\nheld_out_layouts = 16\n");
+    let search = prepared(&text);
+    assert_eq!(search.plan.objective, Objective::LesionProbability);
+    let generation = all(&search, 4);
+    let design = GenerationDesign {
+        space: &search.space,
+        generation: &generation,
+    };
+    let evaluator = GenerationEvaluator {
+        search: &search,
+        design,
+    };
+    let columns = search.columns.described();
+    let named: Vec<&str> = columns
+        .iter()
+        .map(|each| each.key.as_str())
+        .filter(|key| key.contains("probability"))
+        .collect();
+    assert_eq!(named, ["lesion_probability_static"]);
+    let (mut worker, mut compared) = (evaluator.worker(), 0);
+    for case in 0..generation.cases() {
+        let result = worker.evaluate(case).unwrap();
+        let worth = worth_of(&columns, &result);
+        assert_eq!(worth.lesion_probability.is_some(), worth.works, "{case}");
+        let Some(found) = worth.lesion_probability.filter(|_| compared < 2) else {
+            continue;
+        };
+        compared += 1;
+        let layout = StudyCase::of_values(&search.study, case, evaluator.design.values(case));
+        let resolved = layout.scenario(&search.study).unwrap();
+        let rows = StaticWorker::default()
+            .asking(Likely::AsReported)
+            .rows(&resolved);
+        let of_study = rows
+            .iter()
+            .filter(|row| row.outcome == Outcome::Ok)
+            .filter_map(|row| row.get("lesion_probability_static"))
+            .reduce(f64::max);
+        // Four standard deviations of a share of 10 000 draws.
+        let sd = (found * (1.0 - found) / 1e4).sqrt();
+        assert!(
+            (found - of_study.unwrap()).abs() < 4.0 * sd + 1e-4,
+            "{case}: {found} {of_study:?}"
+        );
+    }
+    assert_eq!(compared, 2);
+}
+
+#[test]
+fn lesion_probabilities_need_a_lesion_and_something_that_spreads_needles() {
+    let objective = "[search]\nobjective = \"lesion_probability\"\nheld_out_layouts = 16\n";
+    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+    let table3 = std::fs::read_to_string(scenarios.join("table3.toml")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let searched = |scenario: &str| {
+        let path = folder.path().join("scenario.toml");
+        std::fs::write(&path, scenario).unwrap();
+        let text = BASES
+            .replace("CHEST", &path.display().to_string())
+            .replace("phantom.model", "seed")
+            .replace("[\"female-p5-supine\", \"male-p95-supine\"]", "[1, 2]");
+        try_prepared(&format!("{text}{objective}"))
+    };
+    searched(&table3).unwrap();
+    let perfect = format!("{table3}\n[imperfections]\n");
+    // Ends 26 mm before the point in the lesion.
+    let short = table3.replace("insertion_length_mm = 86", "insertion_length_mm = 60");
+    for (scenario, why) in [(perfect, "does not define"), (short, "goal `pose`")] {
+        let findings = searched(&scenario).unwrap_err();
+        assert_eq!(findings[0].key.as_deref(), Some("search.objective"));
+        assert!(findings[0].message.contains(why), "{findings:?}");
+    }
 }

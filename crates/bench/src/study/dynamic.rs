@@ -20,6 +20,7 @@ use crate::setup::Setup;
 use crate::simulate::{Detail, EngineRun, Simulation};
 
 use super::failure::CaseFailure;
+use super::likely::Likely;
 use super::planned::{case_report, case_setup, eight};
 use super::rows::{CaseRow, broken_rule};
 
@@ -77,10 +78,10 @@ pub fn dynamic_rows(
     engines: &[&'static dyn Engine],
     pool: &EnginePool,
 ) -> Result<[CaseRow; 8], CaseFailure> {
-    Ok(dynamic_case(resolved, engines, pool)?.rows)
+    Ok(dynamic_case(resolved, engines, pool, Likely::AsJudged)?.rows)
 }
 
-/// [`dynamic_rows`] with the times that the parts took.
+/// [`dynamic_rows`] with probabilities, and the times that the parts took.
 ///
 /// # Errors
 /// As [`dynamic_rows`].
@@ -88,6 +89,7 @@ pub fn dynamic_case(
     resolved: &ResolvedScenario,
     engines: &[&'static dyn Engine],
     pool: &EnginePool,
+    likely: Likely,
 ) -> Result<DynamicCase, CaseFailure> {
     let started = Instant::now();
     let mut cost = CaseCost::default();
@@ -111,7 +113,7 @@ pub fn dynamic_case(
         }
         cost.engines.push((engine.name(), begun.elapsed()));
     }
-    let rows = case.rows(&engine_names(engines));
+    let rows = case.rows(&engine_names(engines), likely);
     cost.other = started.elapsed().saturating_sub(cost.total());
     Ok(DynamicCase { rows, cost })
 }
@@ -189,7 +191,7 @@ impl<'a> Case<'a> {
         Ok(())
     }
 
-    fn rows(mut self, engines: &[&'static str]) -> [CaseRow; 8] {
+    fn rows(mut self, engines: &[&'static str], likely: Likely) -> [CaseRow; 8] {
         // What one engine measured where another failed is no result of the configuration.
         for (runs, failed) in self.runs.iter_mut().zip(&self.failed) {
             if failed.is_some() {
@@ -199,7 +201,8 @@ impl<'a> Case<'a> {
         let (setup, plan) = (self.setup, &self.planned.goals[0]);
         let judged = |runs: &Vec<EngineRun>| Adjudicated::without_referee(setup, 0, runs);
         let adjudicated: Vec<Adjudicated> = self.runs.iter().map(judged).collect();
-        let report = case_report(setup, plan, &self.runs, &adjudicated, &self.events, engines);
+        let (runs, events) = (&self.runs, &self.events);
+        let report = case_report(setup, plan, runs, &adjudicated, events, engines, likely);
         let mut reports = [report];
         let resolved = setup.resolved;
         let criteria = &resolved.scenario.criteria;

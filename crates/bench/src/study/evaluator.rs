@@ -6,10 +6,11 @@ use needlebench_scenario::study::{ResolvedStudy, StudyMode};
 use needlebench_study::{CaseError, CaseEvaluator, CaseResult, CaseWorker, Design};
 
 use super::case::StudyCase;
-use super::dynamic::dynamic_rows;
+use super::dynamic::dynamic_case;
 use super::failure::CaseFailure;
+use super::likely::Likely;
 use super::margin::CountedClasses;
-use super::planned::planned_rows;
+use super::planned::planned_case;
 use super::rows::StudyColumns;
 use super::static_case::{StaticWorker, rows_without_scenario};
 
@@ -37,7 +38,8 @@ impl CaseEvaluator for StudyEvaluator<'_> {
             study: self.study,
             design: self.design,
             columns: self.columns,
-            postures: StaticWorker::counting(counted_classes(self.study)),
+            postures: StaticWorker::counting(counted_classes(self.study))
+                .asking(Likely::of(self.study)),
             pool: EnginePool::new(ENGINES),
             scan: LastScan::default(),
         })
@@ -67,6 +69,7 @@ impl CaseWorker for Worker<'_> {
             case,
             message: failure.to_string(),
         };
+        let likely = Likely::of(self.study);
         let layout = StudyCase::new(self.study, self.design, case);
         let scenario = layout
             .scenario(self.study)
@@ -75,7 +78,7 @@ impl CaseWorker for Worker<'_> {
             Err(findings) => rows_without_scenario(&findings, layout.mode),
             Ok(resolved) => match layout.mode {
                 StudyMode::Static => self.postures.rows(&resolved),
-                StudyMode::Planned => planned_rows(&resolved).map_err(failed)?,
+                StudyMode::Planned => planned_case(&resolved, likely).map_err(failed)?,
                 StudyMode::Dynamic => {
                     let named = layout
                         .engines
@@ -83,8 +86,9 @@ impl CaseWorker for Worker<'_> {
                         .or(resolved.scenario.engines.run.as_ref());
                     choose_engines(ENGINES, named.map(Vec::as_slice))
                         .map_err(CaseFailure::from)
-                        .and_then(|engines| dynamic_rows(&resolved, &engines, &self.pool))
+                        .and_then(|engines| dynamic_case(&resolved, &engines, &self.pool, likely))
                         .map_err(failed)?
+                        .rows
                 }
             },
         };

@@ -7,6 +7,7 @@ mod evaluator;
 mod failure;
 mod identity;
 mod launch;
+mod likely;
 mod margin;
 mod planned;
 mod prediction;
@@ -29,8 +30,10 @@ pub use identity::Identity;
 pub use launch::{
     Launch, LaunchFile, LaunchPlan, LaunchRequest, LaunchStep, Launcher, advice, launch_plan,
 };
+pub use likely::Likely;
+pub(crate) use likely::{has_imperfections, has_spread, sets};
 pub use margin::{CountedClasses, MARGIN_COLUMN, margin_column};
-pub use planned::planned_rows;
+pub use planned::{planned_case, planned_rows};
 pub use prepare::{PreparedStudy, in_words, time_per_case};
 pub use replan::{ReplanControl, ReplanDraw, Replanned, replan_draw, replanned};
 pub use robust::{RobustnessResult, robustness_of};

@@ -21,6 +21,7 @@ use crate::setup::Setup;
 use crate::simulate::EngineRun;
 
 use super::failure::CaseFailure;
+use super::likely::Likely;
 use super::rows::{CaseRow, broken_rule};
 
 /// Prepares a case of a scenario with one goal.
@@ -45,6 +46,7 @@ pub(super) fn case_report(
     adjudicated: &[Adjudicated],
     events: &[EventRun],
     engines: &[&'static str],
+    likely: Likely,
 ) -> GoalReport {
     let criteria = &setup.resolved.scenario.criteria;
     let room_counts = criteria.min_free_fraction.is_some()
@@ -53,8 +55,9 @@ pub(super) fn case_report(
     let plans = std::slice::from_ref(plan);
     // A criterion of what is simulated.
     let has_engines = !engines.is_empty();
-    let likely =
-        (has_engines && criteria.has_probability()).then(|| probabilities(setup, plans, 1));
+    let needs_probabilities =
+        likely != Likely::AsJudged || has_engines && criteria.has_probability();
+    let likely = needs_probabilities.then(|| probabilities(setup, plans, 1));
     let context = Context {
         setup,
         budgets: &total_budgets(setup, plans, has_engines),
@@ -75,12 +78,23 @@ pub(super) fn case_report(
 /// # Errors
 /// If the scenario has not exactly one goal, or cannot be planned at all.
 pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[CaseRow; 8], CaseFailure> {
+    planned_case(resolved, Likely::AsJudged)
+}
+
+/// [`planned_rows`] with probabilities.
+///
+/// # Errors
+/// As [`planned_rows`].
+pub fn planned_case(
+    resolved: &ResolvedScenario,
+    likely: Likely,
+) -> Result<[CaseRow; 8], CaseFailure> {
     let model = ClearanceModel::new(&resolved.cell);
     let setup = case_setup(resolved, &model)?;
     let plan = setup.planner.plan(&resolved.goals[0]);
     let none: Vec<Vec<EngineRun>> = plan.configurations.iter().map(|_| Vec::new()).collect();
     let adjudicated = vec![Adjudicated::default(); none.len()];
-    let report = case_report(&setup, &plan, &none, &adjudicated, &[], &[]);
+    let report = case_report(&setup, &plan, &none, &adjudicated, &[], &[], likely);
     let goal = &resolved.goals[0].name;
     let criteria = &resolved.scenario.criteria;
     let rows = plan.configurations.iter().zip(report.configurations);

@@ -1,6 +1,7 @@
 //! Where the needle comes to rest in a posture, without any engine.
 
 use needlebench_engine::Servo;
+use needlebench_evaluation::probability::ProbabilityReport;
 use needlebench_evaluation::{NeedleMeasurement, measure_guide};
 use needlebench_kinematics::Dynamics;
 use needlebench_kinematics::trajectory::JointTrajectory;
@@ -10,7 +11,9 @@ use needlebench_scenario::{PlacedPhantom, ResolvedScenario};
 use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, analytic_total};
 use needlebench_uncertainty::{Truth, servo_of, settle_after};
 
+use super::likely::Likely;
 use crate::budgets::analytic_budget;
+use crate::probability::GoalProbabilities;
 use crate::real_cell::drawn_truth;
 
 /// What is known of the needle in one posture.
@@ -20,6 +23,8 @@ pub(super) struct Predicted {
     pub needle: Option<NeedleMeasurement>,
     /// Over all arms and patients, where a criterion requires it.
     pub budget: Option<ErrorBudget>,
+    /// Over the same, where it is asked for; with what went wrong.
+    pub probability: Option<Result<ProbabilityReport, String>>,
 }
 
 /// Predicts the needle in the postures of one layout.
@@ -29,6 +34,8 @@ pub(super) struct Prediction<'a> {
     real: Option<Real>,
     /// Basis of the error budget, where a criterion requires one.
     expected: Option<&'a Imperfections>,
+    /// Probabilities with their basis, where they are asked for.
+    likely: Option<(GoalProbabilities<'a>, &'a Imperfections)>,
 }
 
 struct Real {
@@ -44,7 +51,11 @@ impl<'a> Prediction<'a> {
     ///
     /// # Errors
     /// The key at fault.
-    pub fn new(resolved: &'a ResolvedScenario, expects_tip: bool) -> Result<Self, &'static str> {
+    pub fn new(
+        resolved: &'a ResolvedScenario,
+        expects_tip: bool,
+        likely: Likely,
+    ) -> Result<Self, &'static str> {
         let real = drawn_truth(resolved)
             .map(|truth| {
                 let truth = truth.map_err(|_| "imperfections.registration.markers_mm")?;
@@ -59,12 +70,21 @@ impl<'a> Prediction<'a> {
         let asked = expects_tip
             || criteria.max_tip_rms_mm.is_some()
             || criteria.max_tip_lateral_rms_mm.is_some();
-        let expected = resolved.expected.as_ref().filter(|_| asked);
+        let all = resolved.expected.as_ref().map(|each| &each.imperfections);
+        let expected = all.filter(|_| asked);
+        let likely = likely.extent().zip(all).map(|(extent, imperfections)| {
+            let goal = &resolved.goals[0];
+            (
+                GoalProbabilities::new(resolved, goal, extent),
+                imperfections,
+            )
+        });
         Ok(Self {
             resolved,
             servo: servo_of(resolved),
             real,
-            expected: expected.map(|expected| &expected.imperfections),
+            expected,
+            likely,
         })
     }
 
@@ -72,12 +92,22 @@ impl<'a> Prediction<'a> {
         self.resolved
     }
 
-    pub fn of(&self, planner: &Planner<'_>, candidate: &Candidate) -> Predicted {
+    /// Of a posture; how likely its needle meets what only where that is wanted.
+    pub fn of(
+        &self,
+        planner: &Planner<'_>,
+        candidate: &Candidate,
+        wants_probability: bool,
+    ) -> Predicted {
         let goal = &self.resolved.goals[0];
         // How the joints came to rest matters for friction alone.
         let drawn = self.real.as_ref().map(|real| &real.truth.actuation);
         let sticks = drawn.is_some_and(|drives| drives.friction.is_some())
-            || self.expected.is_some_and(|each| each.friction.is_some());
+            || self.expected.is_some_and(|each| each.friction.is_some())
+            || self
+                .likely
+                .as_ref()
+                .is_some_and(|(_, each)| each.friction.is_some());
         let motion = if sticks {
             planner.approach(goal, candidate)
         } else {
@@ -92,6 +122,9 @@ impl<'a> Prediction<'a> {
         Predicted {
             needle,
             budget: motion.as_ref().and_then(|motion| self.budget(motion)),
+            probability: motion
+                .filter(|_| wants_probability)
+                .and_then(|motion| self.probability(&motion)),
         }
     }
 
@@ -103,6 +136,13 @@ impl<'a> Prediction<'a> {
             .world_from_guide_exit(&self.resolved.cell, &settled.position);
         let goal = real.truth.goal(goal);
         Some(measure_guide(real.phantom.as_ref(), &goal, &exit))
+    }
+
+    fn probability(&self, motion: &JointTrajectory) -> Option<Result<ProbabilityReport, String>> {
+        let (likely, imperfections) = self.likely.as_ref()?;
+        let goal = &self.resolved.goals[0];
+        let case = BudgetCase::of(self.resolved, goal, &self.servo, imperfections, motion);
+        likely.of(&case)
     }
 
     fn budget(&self, motion: &JointTrajectory) -> Option<ErrorBudget> {

@@ -13,6 +13,7 @@ use needlebench_study::{
 use serde_json::json;
 
 use super::identity::Identity;
+use super::likely;
 use super::rows::StudyColumns;
 use crate::provenance::{SOURCE_SHA256, arithmetic};
 
@@ -40,6 +41,7 @@ impl PreparedStudy {
     /// # Errors
     /// A design that is too large, or a level that cannot be used.
     pub fn new(study: ResolvedStudy) -> Result<Self, Vec<Finding>> {
+        likely::check(&study)?;
         let design = Design::new(&study).map_err(|error| vec![design_finding(&study, &error)])?;
         let identity = Identity::new(&study)?;
         let columns = columns(&study);
@@ -207,6 +209,9 @@ fn columns(study: &ResolvedStudy) -> StudyColumns {
     let modes = modes(study);
     let modes: Vec<StudyMode> = modes.into_iter().collect();
     let mut columns = StudyColumns::new(&modes, &engines);
+    if !study.file.probabilities {
+        columns = columns.without_probabilities();
+    }
     if study.file.search.is_some() && modes.contains(&StudyMode::Static) {
         columns = columns.with_margin();
     }

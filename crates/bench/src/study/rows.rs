@@ -54,6 +54,9 @@ impl CaseRow {
     }
 }
 
+/// The metric of the lesion's probability.
+const LESION_PROBABILITY: &str = "lesion_probability";
+
 /// The columns of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyColumns {
@@ -68,6 +71,19 @@ impl StudyColumns {
             keys: MetricKey::columns(modes, engines),
             has_margin: false,
         }
+    }
+
+    /// Without probabilities.
+    pub fn without_probabilities(mut self) -> Self {
+        self.keys.retain(|key| !key.metric().is_probability);
+        self
+    }
+
+    /// With no probability but that of the lesion.
+    pub fn with_lesion_probability_alone(mut self) -> Self {
+        self.keys
+            .retain(|key| !key.metric().is_probability || key.metric().key == LESION_PROBABILITY);
+        self
     }
 
     /// Without those that are of true targets alone.

@@ -14,6 +14,7 @@ use needlebench_scenario::ResolvedScenario;
 use needlebench_scenario::study::StudyMode;
 use needlebench_study::Outcome;
 
+use super::likely::Likely;
 use super::margin::{CountedClasses, margin_m};
 use super::prediction::Prediction;
 use super::rows::{CaseRow, broken_rule};
@@ -47,6 +48,8 @@ pub struct StaticWorker {
     counted: CountedClasses,
     /// Whether the RMS tip error is computed without a criterion, too.
     expects_tip: bool,
+    /// Probabilities of configurations that no rule rejects.
+    likely: Likely,
 }
 
 /// The eight rows of one layout; `resolved` has one goal, or its first one counts.
@@ -91,6 +94,11 @@ impl StaticWorker {
             expects_tip,
             ..self
         }
+    }
+
+    /// Estimates probabilities of configurations that no rule rejects.
+    pub fn asking(self, likely: Likely) -> Self {
+        Self { likely, ..self }
     }
 
     /// The eight rows of one layout; `resolved` has one goal, or its first one counts.
@@ -182,7 +190,7 @@ impl StaticWorker {
             return Err("goals");
         }
         let route_m = route_m(resolved);
-        let prediction = Prediction::new(resolved, self.expects_tip)?;
+        let prediction = Prediction::new(resolved, self.expects_tip, self.likely)?;
         let known = self.kinematics.take();
         let model = self.model(resolved);
         let planner = match known {
@@ -259,9 +267,14 @@ fn row(
     let goal = &resolved.goals[0];
     posture.tip_sensitivity_m_per_rad = Some(planner.tip_sensitivity(goal, candidate));
     posture.entry_to_target_m = goal.entry_to_target_m();
-    let predicted = prediction.of(planner, candidate);
+    let predicted = prediction.of(planner, candidate, outcome == Outcome::Ok);
     posture.predicted = predicted.needle;
     posture.budget = predicted.budget;
+    match predicted.probability {
+        Some(Ok(found)) => posture.probability = Some(found),
+        Some(Err(error)) => posture.probability_failure = Some(error),
+        None => {}
+    }
     if outcome == Outcome::Ok
         && let Some(fault) = judge_posture(posture, &resolved.scenario.criteria)
     {

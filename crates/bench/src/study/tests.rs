@@ -4,18 +4,26 @@ use std::path::{Path, PathBuf};
 
 use needlebench_cell::ClearanceClass;
 use needlebench_clearance::ClearanceModel;
+use needlebench_evaluation::metric::MetricKey;
+use needlebench_evaluation::report::ConfigurationReport;
+use needlebench_input::Finding;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{Planner, needle_route};
 use needlebench_scenario::study::{
-    Distribution, FactorValues, Role, SamplingMethod, StudyFactor, StudyMode,
+    Distribution, FactorValues, Role, SamplingMethod, StudyFactor, StudyMode, load_study,
 };
 use needlebench_scenario::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting};
-use needlebench_study::{Design, FactorValue, Outcome};
+use needlebench_study::{CaseEvaluator as _, CaseResult, Design, FactorValue, Outcome};
 
 use super::robustness::{RESOLUTION, RobustnessSettings, robustness};
-use super::{CaseRow, StaticWorker, StudyColumns, rows_without_scenario, static_rows};
+use super::{
+    CaseRow, PreparedStudy, StaticWorker, StudyCase, StudyColumns, StudyEvaluator,
+    rows_without_scenario, static_rows,
+};
+use crate::probability::probabilities;
 use crate::real_cell::RealCell;
+use crate::setup::Setup;
 
 fn family(name: &str) -> ScenarioFamily {
     let path: PathBuf =
@@ -438,4 +446,138 @@ fn static_rows_have_static_columns_alone() {
         assert!((column - roll_deg).abs() < 1e-5 * roll_deg.abs().max(1.0));
         assert_eq!(described[place("roll_static")].name, "roll_static_deg");
     }
+}
+
+/// A study of the paper's pose, with such a head and such imperfections.
+fn prepared(head: &str, imperfections: &str) -> Result<PreparedStudy, Vec<Finding>> {
+    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(scenarios.join("table3.toml")).unwrap();
+    let scenario = format!("{text}\n[imperfections]\n{imperfections}");
+    std::fs::write(folder.path().join("scenario.toml"), scenario).unwrap();
+    let study = format!(
+        "name = \"likely\"\nscenario = \"scenario.toml\"\n{head}\n[[factors]]\nname = \"height\"\n\
+         key = \"robot.base_position_mm[2]\"\nvalues = [795, 800, 805]\n"
+    );
+    let file = folder.path().join("study.toml");
+    std::fs::write(&file, study).unwrap();
+    PreparedStudy::new(load_study(&file, &Overrides::default()).unwrap())
+}
+
+/// Nothing of it knows how joints came to rest.
+const WITHOUT_FRICTION: &str = "[imperfections.calibration]\n[imperfections.hand_eye]\n\
+                                translation_mm = 2.5\n[imperfections.guide]\n";
+
+const PROBABILITIES: [&str; 4] = [
+    "lesion_probability",
+    "bone_probability",
+    "vessel_probability",
+    "organ_probability",
+];
+
+/// The rows of a case, and the keys of its columns.
+fn evaluated(prepared: &PreparedStudy, case: u64) -> (Vec<String>, CaseResult) {
+    let (study, design) = (&prepared.study, &prepared.design);
+    let evaluator = StudyEvaluator::new(study, design, &prepared.columns);
+    let result = evaluator.worker().evaluate(case).unwrap();
+    let described = prepared.columns.described();
+    (described.into_iter().map(|each| each.key).collect(), result)
+}
+
+/// The posture of this pose is that of its plan, and without friction the motion does not matter.
+#[test]
+fn probabilities_of_static_and_planned_cases_are_those_of_a_run() {
+    let heads = ["static", "planned"];
+    let heads = heads.map(|mode| format!("mode = \"{mode}\"\nprobabilities = true"));
+    let [fixed, planned] = heads.map(|head| prepared(&head, WITHOUT_FRICTION).unwrap());
+    let (_, of_static) = evaluated(&fixed, 1);
+    let (keys, of_planned) = evaluated(&planned, 1);
+    let static_keys = evaluated(&fixed, 1).0;
+    // What a run does: all configurations of its plan.
+    let layout = StudyCase::new(&planned.study, &planned.design, 1);
+    let resolved = layout.scenario(&planned.study).unwrap();
+    let model = ClearanceModel::new(&resolved.cell);
+    let setup = Setup::new(&resolved, &model).unwrap();
+    let plan = setup.planner.plan(&resolved.goals[0]);
+    let of_run = probabilities(&setup, std::slice::from_ref(&plan), 2);
+    let place = |keys: &[String], key: &str| keys.iter().position(|each| each == key).unwrap();
+    let mut compared = 0;
+    for (index, found) in of_run[0].iter().enumerate() {
+        let Some(Ok(found)) = found else {
+            continue;
+        };
+        let mut report = ConfigurationReport::new("");
+        report.probability = Some(found.clone());
+        for key in PROBABILITIES {
+            let expected = MetricKey::named(key, &[]).unwrap().read(&report);
+            let value = of_planned.rows[index].get(place(&keys, key));
+            #[expect(clippy::cast_possible_truncation, reason = "as columns are")]
+            let in_column = expected.map(|each| each as f32);
+            assert_eq!(value, in_column, "{index} {key}");
+            let row = &of_static.rows[index];
+            let value = row.get(place(&static_keys, &format!("{key}_static")));
+            if row.outcome == Outcome::Rejected {
+                assert_eq!(value, None, "{index} {key}");
+            } else {
+                // By rounding a draw or two more are in or out.
+                let [value, expected] = [value.unwrap().into(), expected.unwrap()];
+                assert!(
+                    (value - expected).abs() < 1e-3,
+                    "{index} {key}: {value} {expected}"
+                );
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared >= 16, "{compared}");
+}
+
+/// Columns are there where they are asked for alone, and nothing else changes with them.
+#[test]
+fn only_studies_that_ask_for_probabilities_have_columns_of_them() {
+    let asked = prepared("mode = \"static\"\nprobabilities = true", WITHOUT_FRICTION).unwrap();
+    let plain = prepared("mode = \"static\"", WITHOUT_FRICTION).unwrap();
+    let (keys, with) = evaluated(&asked, 0);
+    let (others, without) = evaluated(&plain, 0);
+    let more: Vec<&str> = keys
+        .iter()
+        .filter(|key| !others.contains(key))
+        .map(|key| key.trim_end_matches("_static"))
+        .collect();
+    assert_eq!(more, PROBABILITIES);
+    for (with, without) in with.rows.iter().zip(&without.rows) {
+        assert_eq!(
+            (with.outcome, &with.detail),
+            (without.outcome, &without.detail)
+        );
+        for (index, key) in others.iter().enumerate() {
+            let place = keys.iter().position(|each| each == key).unwrap();
+            assert_eq!(with.get(place), without.get(index), "{key}");
+        }
+    }
+}
+
+/// Whatever a worker evaluated before.
+#[test]
+fn probabilities_depend_on_the_layout_alone() {
+    let asked = prepared("mode = \"static\"\nprobabilities = true", WITHOUT_FRICTION).unwrap();
+    let evaluator = StudyEvaluator::new(&asked.study, &asked.design, &asked.columns);
+    let mut worker = evaluator.worker();
+    let in_turn: Vec<CaseResult> = [2, 0, 1, 0]
+        .map(|case| worker.evaluate(case).unwrap())
+        .into();
+    for result in in_turn {
+        assert_eq!(result.rows, evaluated(&asked, result.case).1.rows);
+    }
+}
+
+#[test]
+fn probabilities_of_a_perfect_arm_are_refused() {
+    let findings = prepared("probabilities = true", "").unwrap_err();
+    assert_eq!(findings[0].key.as_deref(), Some("probabilities"));
+    assert!(
+        findings[0].message.contains("does not define"),
+        "{findings:?}"
+    );
+    prepared("", "").unwrap();
 }

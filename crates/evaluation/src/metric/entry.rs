@@ -237,6 +237,8 @@ pub struct Metric {
     pub unit: Unit,
     /// Whether it is of a goal's true target alone: studies without any have no columns of it.
     pub is_of_true_target: bool,
+    /// Whether it is estimated by draws of needles: studies have columns of it only where they ask for them.
+    pub is_probability: bool,
     /// Whether studies have columns of each engine's value too.
     pub each_engine: bool,
     /// What a study's statistics do with it.
@@ -288,6 +290,7 @@ impl Metric {
             },
             unit: quantity.column_unit(),
             is_of_true_target: false,
+            is_probability: false,
             each_engine: false,
             statistics: Statistics::NONE,
             static_statistics: Statistics::NONE,
@@ -470,6 +473,13 @@ impl Metric {
     pub(super) const fn of_true_target(self) -> Self {
         Self {
             is_of_true_target: true,
+            ..self
+        }
+    }
+
+    pub(super) const fn probability(self) -> Self {
+        Self {
+            is_probability: true,
             ..self
         }
     }

@@ -90,16 +90,12 @@ fn table(search: &PreparedSearch, log: &SearchLog, listed: &[(usize, &str)]) -> 
             unit => format!("{}\n({unit})", factor.name),
         })
         .collect();
-    let figures = log
-        .objectives
-        .iter()
-        .map(|objective| match objective.unit() {
-            "1" => "success\nrate".to_owned(),
-            unit => match objective {
-                Objective::Margin { .. } => format!("{}\n({unit})", objective.words()),
-                _ => format!("tip error\n({unit})"),
-            },
-        });
+    let figures = log.objectives.iter().map(|objective| match objective {
+        Objective::Rate => "success\nrate".to_owned(),
+        Objective::LesionProbability => "lesion\nprobability".to_owned(),
+        Objective::Margin { .. } => format!("{}\n({})", objective.words(), objective.unit()),
+        Objective::TipError { .. } => format!("tip error\n({})", objective.unit()),
+    });
     let figures: Vec<String> = figures.collect();
     let has_rate = log.objectives.contains(&Objective::Rate);
     let mut header = vec![""];
@@ -214,6 +210,7 @@ pub(crate) fn figure(objective: Objective, value: Option<f64>) -> String {
         (Objective::Rate, Some(share)) => percent(share),
         (Objective::Margin { .. }, Some(mm)) => format!("{mm:.1}"),
         (Objective::TipError { .. }, Some(mm)) => format!("{mm:.3}"),
+        (Objective::LesionProbability, Some(share)) => format!("{share:.3}"),
     }
 }
 

@@ -51,6 +51,10 @@ pub struct StudyFile {
     #[serde(default = "replanned_cases")]
     #[schemars(range(max = 10_000))]
     pub replanned_cases: u32,
+    /// Adds columns of how likely the needle's tip is in the lesion, and its surface closer than 1 mm to bone, vessels and
+    /// organs, over the arm and patient population, which the scenario must define. Slower.
+    #[serde(default)]
+    pub probabilities: bool,
     /// Engines of dynamic cases. Default: the scenario's.
     #[serde(default)]
     pub engines: Option<Vec<EngineName>>,

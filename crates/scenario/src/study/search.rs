@@ -16,6 +16,8 @@ pub enum ObjectiveName {
     Rate,
     /// Mean over the layouts of the RMS tip error.
     TipError,
+    /// Mean over the layouts of the probability that the needle's tip is in the lesion.
+    LesionProbability,
 }
 
 impl ObjectiveName {
@@ -25,6 +27,7 @@ impl ObjectiveName {
             Self::Margin => "margin",
             Self::Rate => "rate",
             Self::TipError => "tip_error",
+            Self::LesionProbability => "lesion_probability",
         }
     }
 }
@@ -34,7 +37,7 @@ impl ObjectiveName {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SearchSection {
-    /// Objective: `margin`, `rate` or `tip_error`.
+    /// Objective: `margin`, `rate`, `tip_error` or `lesion_probability`.
     pub objective: ObjectiveName,
     /// Second objective: the result is then the Pareto set. Default: none.
     pub second_objective: Option<ObjectiveName>,

@@ -15,6 +15,8 @@ pub struct CaseWorth {
     pub works: bool,
     /// The least RMS tip error of the feasible ones, mm; none where none is.
     pub tip_error_mm: Option<f64>,
+    /// The largest probability of the feasible ones that the tip is in the lesion; none where none is.
+    pub lesion_probability: Option<f64>,
 }
 
 /// An objective of a candidate, from the outcomes of its cases.
@@ -34,6 +36,8 @@ pub enum Objective {
         /// Value of a case without a feasible configuration, mm.
         without_mm: f64,
     },
+    /// The mean probability that the tip is in the lesion, 0 of a case without a feasible configuration: more is better.
+    LesionProbability,
 }
 
 /// Ends of an interval; none where the sample is too small for one.
@@ -63,6 +67,7 @@ impl Objective {
             ObjectiveName::Margin => Self::Margin { quantile },
             ObjectiveName::Rate => Self::Rate,
             ObjectiveName::TipError => Self::TipError { without_mm },
+            ObjectiveName::LesionProbability => Self::LesionProbability,
         }
     }
 
@@ -74,14 +79,15 @@ impl Objective {
                 .replace("00 ", " "),
             Self::Rate => "success rate".to_owned(),
             Self::TipError { .. } => "mean RMS tip error".to_owned(),
+            Self::LesionProbability => "mean lesion probability".to_owned(),
         }
     }
 
-    /// Unit of its figure; `1` of a share.
+    /// Unit of its figure; `1` of a share and of a probability.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Margin { .. } | Self::TipError { .. } => "mm",
-            Self::Rate => "1",
+            Self::Rate | Self::LesionProbability => "1",
         }
     }
 
@@ -105,6 +111,7 @@ impl Objective {
             Self::TipError { without_mm } => {
                 -mean(values, |each| each.tip_error_mm.unwrap_or(without_mm))
             }
+            Self::LesionProbability => mean(values, CaseWorth::in_lesion),
         }
     }
 
@@ -115,6 +122,7 @@ impl Objective {
             margin_mm: out.unwrap_or(f64::INFINITY),
             works: out.is_none(),
             tip_error_mm: out.is_none().then_some(0.0),
+            lesion_probability: out.is_none().then_some(1.0),
         };
         let values: Vec<CaseWorth> = out_of_reach.iter().map(best).collect();
         self.score(&values)
@@ -158,14 +166,14 @@ impl Objective {
             Self::Rate => of(clopper_pearson_with(self.score(values), n as f64, TAIL)),
             Self::TipError { without_mm } => {
                 let of_case = |each: &CaseWorth| each.tip_error_mm.unwrap_or(without_mm);
-                let mean = mean(values, of_case);
-                let squares = values.iter().map(|each| (of_case(each) - mean).powi(2));
-                if n < 2 {
-                    none
-                } else {
-                    let variance = squares.sum::<f64>() / (n - 1) as f64;
-                    of(about_mean(mean, (variance / n as f64).sqrt(), n - 1))
-                }
+                of_mean(values, of_case).map_or(none, of)
+            }
+            Self::LesionProbability => {
+                let within = |interval: Interval| Interval {
+                    low: interval.low.max(0.0),
+                    high: interval.high.min(1.0),
+                };
+                of_mean(values, CaseWorth::in_lesion).map_or(none, |found| of(within(found)))
             }
         };
         Estimate {
@@ -174,6 +182,25 @@ impl Objective {
             cases: n as u64,
         }
     }
+}
+
+impl CaseWorth {
+    /// The probability that the tip is in the lesion; 0 without a feasible configuration.
+    pub(super) fn in_lesion(&self) -> f64 {
+        self.lesion_probability.unwrap_or(0.0)
+    }
+}
+
+/// Student's interval of a mean; none of fewer than two values.
+fn of_mean(values: &[CaseWorth], of: impl Fn(&CaseWorth) -> f64) -> Option<Interval> {
+    let n = values.len();
+    if n < 2 {
+        return None;
+    }
+    let mean = mean(values, &of);
+    let squares = values.iter().map(|each| (of(each) - mean).powi(2));
+    let variance = squares.sum::<f64>() / (n - 1) as f64;
+    Some(about_mean(mean, (variance / n as f64).sqrt(), n - 1))
 }
 
 fn mean(values: &[CaseWorth], of: impl Fn(&CaseWorth) -> f64) -> f64 {
@@ -200,6 +227,7 @@ mod tests {
             margin_mm,
             works: margin_mm >= 0.0,
             tip_error_mm: (margin_mm >= 0.0).then_some(0.5),
+            lesion_probability: (margin_mm >= 0.0).then_some(0.75),
         };
         margins.iter().map(value).collect()
     }
@@ -230,6 +258,7 @@ mod tests {
         assert_eq!(Objective::Rate.most(&out), 0.75);
         let tip = Objective::TipError { without_mm: 8.0 };
         assert_eq!(tip.most(&out), -2.0);
+        assert_eq!(Objective::LesionProbability.most(&out), 0.75);
         let low = Objective::Margin { quantile: 0.0 };
         assert_eq!(low.most(&out), -3.0);
         let middle = Objective::Margin { quantile: 0.5 };
@@ -245,6 +274,25 @@ mod tests {
         assert_eq!(found.interval.high, Some(11.0));
         let few = Objective::Margin { quantile: 0.05 }.estimate(&values(&x[..40]));
         assert_eq!(few.interval.low, None, "no end where the sample has none");
+    }
+
+    /// `scipy.stats.t.interval(0.95, 7, 0.65625, x.std(ddof=1) / sqrt(8))`, of seven 0.75 and one 0; of few cases the
+    /// upper end would be above 1.
+    #[test]
+    fn lesion_probabilities_have_students_interval_within_0_and_1() {
+        let mut margins = vec![1.0; 7];
+        margins.push(-1.0);
+        let found = Objective::LesionProbability.estimate(&values(&margins));
+        assert_eq!(found.value, Some(0.656_25));
+        assert!((found.interval.low.unwrap() - 0.434_566_5).abs() < 1e-6);
+        assert!((found.interval.high.unwrap() - 0.877_933_5).abs() < 1e-6);
+        let few = Objective::LesionProbability.estimate(&values(&[1.0, -1.0]));
+        assert_eq!(
+            (few.interval.low, few.interval.high),
+            (Some(0.0), Some(1.0))
+        );
+        let none = Objective::LesionProbability.estimate(&values(&[1.0]));
+        assert_eq!(none.interval.low, None);
     }
 
     #[test]

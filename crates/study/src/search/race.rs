@@ -100,6 +100,9 @@ impl<'a> Race<'a> {
                     Objective::TipError { without_mm } => -counted_mean(values, &counts, |each| {
                         each.tip_error_mm.unwrap_or(without_mm)
                     }),
+                    Objective::LesionProbability => {
+                        counted_mean(values, &counts, CaseWorth::in_lesion)
+                    }
                 });
             }
         }
@@ -242,6 +245,7 @@ mod tests {
                     margin_mm,
                     works: margin_mm >= 0.0,
                     tip_error_mm: Some(10.0 - margin_mm),
+                    lesion_probability: None,
                 });
             }
         }

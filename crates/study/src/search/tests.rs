@@ -57,6 +57,7 @@ impl<F: Fn(&[FactorValue]) -> f64> Known<F> {
                 margin_mm: -5.0 - common.abs(),
                 works: false,
                 tip_error_mm: None,
+                lesion_probability: None,
             };
         }
         let mut parts = vec![stream as u64, circumstance, 77];
@@ -67,6 +68,7 @@ impl<F: Fn(&[FactorValue]) -> f64> Known<F> {
             margin_mm,
             works: margin_mm >= 0.0,
             tip_error_mm: (margin_mm >= 0.0).then_some(1.0 + number(candidate[0]) / 10.0),
+            lesion_probability: None,
         }
     }
 }

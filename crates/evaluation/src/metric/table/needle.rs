@@ -24,7 +24,7 @@ const STRUCTURE_RESOLUTION: f64 = 1e-3;
 
 /// How likely the needle comes close to what of one tissue it most likely does.
 macro_rules! structure_probability {
-    ($key:literal, $words:literal, $definition:literal, $criterion:literal, $tissue:ident) => {
+    ($key:literal, $static_key:literal, $words:literal, $definition:literal, $criterion:literal, $tissue:ident) => {
         Metric::new(
             $key,
             $words,
@@ -32,9 +32,11 @@ macro_rules! structure_probability {
             Ratio,
             Configuration(|each| each.probability.as_ref()?.value_of(stringify!($tissue))),
         )
-        .only_in(&[])
+        .probability()
         .known(Value, OverBudget, FinalPosture)
+        .in_static_cases($static_key)
         .better(Less, STRUCTURE_RESOLUTION)
+        .statistics(Statistics::SPREAD)
         .criterion($criterion, &[Dynamic], |criteria| {
             criteria.max_structure_probability.$tissue
         })
@@ -442,9 +444,11 @@ pub(super) const BUDGET: &[Metric] = &[
         Ratio,
         Configuration(|each| each.probability.as_ref()?.in_lesion.as_ref()?.event.probability),
     )
-    .only_in(&[])
+    .probability()
     .known(Value, OverBudget, FinalPosture)
+    .in_static_cases("lesion_probability_static")
     .better(More, LESION_RESOLUTION)
+    .statistics(Statistics::SPREAD)
     .criterion("min_lesion_probability", &[Dynamic], |criteria| {
         criteria.min_lesion_probability
     })
@@ -454,6 +458,7 @@ pub(super) const BUDGET: &[Metric] = &[
     }),
     structure_probability!(
         "bone_probability",
+        "bone_probability_static",
         "needle close to bone",
         "probability that the needle comes closer than 1 mm to the bone that it most likely does",
         "max_structure_probability.bone",
@@ -461,6 +466,7 @@ pub(super) const BUDGET: &[Metric] = &[
     ),
     structure_probability!(
         "vessel_probability",
+        "vessel_probability_static",
         "needle close to a vessel",
         "probability that the needle comes closer than 1 mm to the vessel that it most likely does",
         "max_structure_probability.vessel",
@@ -468,6 +474,7 @@ pub(super) const BUDGET: &[Metric] = &[
     ),
     structure_probability!(
         "organ_probability",
+        "organ_probability_static",
         "needle close to an organ",
         "probability that the needle comes closer than 1 mm to the organ that it most likely does, without that of the target",
         "max_structure_probability.organ",
