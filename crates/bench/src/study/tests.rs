@@ -9,6 +9,7 @@ use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_input::Finding;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_parallel::in_parallel;
 use needlebench_planning::{Planner, needle_route};
 use needlebench_scenario::study::{
     Distribution, FactorValues, Role, SamplingMethod, StudyFactor, StudyMode, load_study,
@@ -457,7 +458,7 @@ fn prepared(head: &str, imperfections: &str) -> Result<PreparedStudy, Vec<Findin
     std::fs::write(folder.path().join("scenario.toml"), scenario).unwrap();
     let study = format!(
         "name = \"likely\"\nscenario = \"scenario.toml\"\n{head}\n[[factors]]\nname = \"height\"\n\
-         key = \"robot.base_position_mm[2]\"\nvalues = [795, 800, 805]\n"
+         key = \"robot.base_position_mm[2]\"\nvalues = [799, 800, 801]\n"
     );
     let file = folder.path().join("study.toml");
     std::fs::write(&file, study).unwrap();
@@ -545,6 +546,11 @@ fn only_studies_that_ask_for_probabilities_have_columns_of_them() {
         .map(|key| key.trim_end_matches("_static"))
         .collect();
     assert_eq!(more, PROBABILITIES);
+    let place = keys
+        .iter()
+        .position(|key| key == "lesion_probability_static");
+    let told = with.rows.iter().filter_map(|row| row.get(place.unwrap()));
+    assert!(told.count() > 0);
     for (with, without) in with.rows.iter().zip(&without.rows) {
         assert_eq!(
             (with.outcome, &with.detail),
@@ -557,18 +563,18 @@ fn only_studies_that_ask_for_probabilities_have_columns_of_them() {
     }
 }
 
-/// Whatever a worker evaluated before.
+/// Whatever a worker evaluated before, and on however many threads.
 #[test]
 fn probabilities_depend_on_the_layout_alone() {
     let asked = prepared("mode = \"static\"\nprobabilities = true", WITHOUT_FRICTION).unwrap();
     let evaluator = StudyEvaluator::new(&asked.study, &asked.design, &asked.columns);
     let mut worker = evaluator.worker();
-    let in_turn: Vec<CaseResult> = [2, 0, 1, 0]
-        .map(|case| worker.evaluate(case).unwrap())
-        .into();
-    for result in in_turn {
-        assert_eq!(result.rows, evaluated(&asked, result.case).1.rows);
-    }
+    let cases = [2, 0, 1];
+    // What is missing is no number, which no number equals.
+    let in_words = |result: CaseResult| format!("{:?}", result.rows);
+    let in_turn = cases.map(|case| in_words(worker.evaluate(case).unwrap()));
+    let at_once = in_parallel(2, &cases, |case| in_words(evaluated(&asked, *case).1));
+    assert_eq!(in_turn.as_slice(), at_once);
 }
 
 #[test]

@@ -1,10 +1,14 @@
 //! Planned and dynamic cases of a study: their numbers are those of a run, whatever ran before.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use needlebench_bench::study::{CaseRow, StudyColumns, dynamic_rows, planned_rows};
+use needlebench_bench::study::{
+    CaseRow, Likely, StaticWorker, StudyColumns, dynamic_case, dynamic_rows, planned_case,
+    planned_rows,
+};
 use needlebench_bench::{RunOptions, run_scenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{
@@ -12,6 +16,7 @@ use needlebench_engine::{
     choose_engines, simulate,
 };
 use needlebench_evaluation::metric::set_measured;
+use needlebench_evaluation::probability::ProbabilityReport;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
 use needlebench_evaluation::{certify_recording, measure_clearance, recorded_clearance};
 use needlebench_kinematics::Joints;
@@ -178,6 +183,33 @@ fn a_criterion_on_a_probability_is_judged_in_a_case_as_in_a_run() {
         configuration.probability.is_some()
     });
     assert!(known.count() > 0);
+}
+
+/// All numbers, and of a static case but for the draws that rounding counts otherwise.
+#[test]
+fn probabilities_that_a_study_asks_for_are_those_of_a_run() {
+    let scenario = resolved(SMALL);
+    let report = of_run(&scenario);
+    let asked = Likely::AsReported;
+    let simulated = dynamic_case(&scenario, &both(), &pool(), asked).unwrap();
+    let planned = planned_case(&scenario, asked).unwrap();
+    let fixed = StaticWorker::default().asking(asked).rows(&scenario);
+    let mut told = 0;
+    for (index, configuration) in report.configurations.iter().enumerate() {
+        let expected = &configuration.probability;
+        assert_eq!(*expected, simulated.rows[index].measured.probability);
+        assert_eq!(*expected, planned[index].measured.probability);
+        let (Some(expected), Some(found)) = (expected, &fixed[index].measured.probability) else {
+            continue;
+        };
+        let names = |report: &ProbabilityReport| -> BTreeSet<String> {
+            let structures = report.structures.iter();
+            structures.map(|each| each.structure.clone()).collect()
+        };
+        assert_eq!(names(expected), names(found));
+        told += 1;
+    }
+    assert!(told >= 4, "{told}");
 }
 
 #[test]
