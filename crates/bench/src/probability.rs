@@ -1,6 +1,7 @@
 //! How likely a configuration's needle comes too close to structures, and its tip is in the lesion.
 
 use std::cell::OnceCell;
+use std::iter;
 
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use needlebench_evaluation::probability::{
@@ -61,11 +62,12 @@ const SLICES_M: [f64; 2] = [1e-3, 5e-3];
 /// are none.
 pub(crate) type Probabilities = Vec<Vec<Option<Result<ProbabilityReport, String>>>>;
 
-/// Of all configurations that have a motion.
+/// Of all configurations that have a motion; with larger assumed errors besides, if asked.
 pub(crate) fn probabilities(
     setup: &Setup<'_>,
     plans: &[GoalPlan],
     threads: usize,
+    with_larger: bool,
 ) -> Probabilities {
     let resolved = setup.resolved;
     let goals = resolved.goals.iter();
@@ -74,7 +76,7 @@ pub(crate) fn probabilities(
         .collect();
     let draws = Extent::All.draws(resolved);
     let found = of_each(setup, plans, threads, |goal, case| {
-        Some(goals[goal].as_ref()?.of(case, &draws))
+        Some(goals[goal].as_ref()?.of(case, &draws, with_larger))
     });
     let flat = |each: Vec<Option<Option<_>>>| each.into_iter().map(Option::flatten).collect();
     found.into_iter().map(flat).collect()
@@ -129,7 +131,7 @@ impl<'a> GoalProbabilities<'a> {
     pub fn of(&self, case: &BudgetCase<'_>) -> Option<Result<ProbabilityReport, String>> {
         let prepare = || Surroundings::new(self.resolved, self.goal, self.extent);
         let around = self.around.get_or_init(prepare).as_ref()?;
-        Some(around.of(case, &self.extent.draws(self.resolved)))
+        Some(around.of(case, &self.extent.draws(self.resolved), false))
     }
 }
 
@@ -348,11 +350,16 @@ impl<'a> Surroundings<'a> {
             .collect()
     }
 
-    /// Probabilities of a configuration's needle.
+    /// Probabilities of a configuration's needle; with larger assumed errors besides, if asked.
     ///
     /// # Errors
     /// A sentence.
-    fn of(&self, case: &BudgetCase<'_>, draws: &Draws) -> Result<ProbabilityReport, String> {
+    fn of(
+        &self,
+        case: &BudgetCase<'_>,
+        draws: &Draws,
+        with_larger: bool,
+    ) -> Result<ProbabilityReport, String> {
         let off_m = case.held_off_m.map(|off_m| off_m.norm());
         if let Some(off_m) = off_m.into_iter().find(|off_m| *off_m > HELD_M) {
             return Err(format!(
@@ -396,22 +403,23 @@ impl<'a> Surroundings<'a> {
         events.push(inside(count + 2));
         events.extend(self.lesion.iter().map(|_| inside(count + 3)));
         let found = estimate(&about, &events, draws).map_err(|error| error.to_string())?;
-        let law_larger = assumed_larger(&law, case.imperfections)?;
-        let seen_larger = self.boundaries_larger();
-        let under = about
-            .under(&law_larger, &seen_larger)
-            .map_err(|error| error.to_string())?;
-        let larger = estimate(&under, &events, draws).map_err(|error| error.to_string())?;
-        let found: Vec<[Estimate; 2]> = found
-            .into_iter()
-            .zip(larger)
-            .map(|both| both.into())
-            .collect();
+        let larger = if with_larger {
+            let law = assumed_larger(&law, case.imperfections)?;
+            let seen = self.boundaries_larger();
+            let under = about
+                .under(&law, &seen)
+                .map_err(|error| error.to_string())?;
+            estimate(&under, &events, draws).map_err(|error| error.to_string())?
+        } else {
+            Vec::new()
+        };
+        let larger = larger.into_iter().map(Some).chain(iter::repeat(None));
+        let found: Vec<(Estimate, Option<Estimate>)> = found.into_iter().zip(larger).collect();
         let (of_structures, others) = found.split_at(told.len());
         let [any, within_2_mm, in_lesion @ ..] = others else {
             return Err("estimates are missing".to_owned());
         };
-        let report = |estimates: &[Estimate; 2], at_most: Option<f64>| {
+        let report = |estimates: &(Estimate, Option<Estimate>), at_most: Option<f64>| {
             event_report(estimates, at_most, &law)
         };
         let mut structures: Vec<StructureProbability> = Vec::new();
@@ -470,7 +478,7 @@ impl<'a> Surroundings<'a> {
 
 /// Of an estimate, and of that with the assumed deviations larger.
 fn event_report(
-    [estimate, larger]: &[Estimate; 2],
+    (estimate, larger): &(Estimate, Option<Estimate>),
     at_most: Option<f64>,
     law: &Law,
 ) -> EventProbability {
@@ -491,7 +499,8 @@ fn event_report(
         at_most,
         of_1000: estimate_label(estimate),
         at_most_of_1000: at_most.map(bound_label),
-        assumed_larger: Some(larger)
+        assumed_larger: larger
+            .as_ref()
             .filter(is_drawn)
             .map(|larger| LargerProbability {
                 probability: larger.probability,
@@ -726,7 +735,7 @@ mod tests {
             moves: false,
         };
         let around = Surroundings::new(&resolved, &resolved.goals[0], Extent::All).unwrap();
-        let found = around.of(&case, &draws).unwrap();
+        let found = around.of(&case, &draws, true).unwrap();
         let first = &found.structures[0];
         let [close, within] = shares(&resolved, motion, &first.structure);
         for (name, event, share) in [

@@ -287,7 +287,7 @@ pub(crate) fn run_goals(
     );
     let budgets = budgets(&setup, plans, control.threads);
     tracing::info!("error budgets computed");
-    let probabilities = probabilities(&setup, plans, control.threads);
+    let probabilities = probabilities(&setup, plans, control.threads, true);
     tracing::info!("probabilities estimated");
     let interrupted = control.is_cancelled();
     let results = Results {

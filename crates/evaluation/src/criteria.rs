@@ -8,7 +8,7 @@ use needlebench_scenario::scenario::CriteriaSection;
 use needlebench_scenario::study::StudyMode;
 
 use crate::adjudication::{WITHOUT_CONTACT, sentence};
-use crate::metric::{Better, Criterion, Metric, Missing, Quantity, Source, metrics};
+use crate::metric::{Asked, Better, Criterion, Metric, Missing, Quantity, Source, metrics};
 use crate::report::{ConfigurationReport, CriterionResult, EngineReport, Judged, NotJudged};
 use crate::verdict::{UNCOMPARED, unmeasured_by};
 
@@ -200,7 +200,7 @@ pub fn check_configuration(
         judged.results.extend(of_envelope);
     }
     for checked in others {
-        let is_probability = checked.metric.is_probability;
+        let is_probability = checked.metric.asked == Asked::Probabilities;
         judged.add(result(checked), || {
             let budget = configuration.budget_failure.as_ref();
             let budget = budget.map(|failure| format!("no error budget: {failure}"));

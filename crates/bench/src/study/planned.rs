@@ -57,7 +57,7 @@ pub(super) fn case_report(
     let has_engines = !engines.is_empty();
     let needs_probabilities =
         likely != Likely::AsJudged || has_engines && criteria.has_probability();
-    let likely = needs_probabilities.then(|| probabilities(setup, plans, 1));
+    let likely = needs_probabilities.then(|| probabilities(setup, plans, 1, false));
     let context = Context {
         setup,
         budgets: &total_budgets(setup, plans, has_engines),

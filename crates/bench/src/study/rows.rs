@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use needlebench_evaluation::metric::{self, MetricKey};
+use needlebench_evaluation::metric::{self, Asked, MetricKey};
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_planning::Rejection;
@@ -75,20 +75,23 @@ impl StudyColumns {
 
     /// Without probabilities.
     pub fn without_probabilities(mut self) -> Self {
-        self.keys.retain(|key| !key.metric().is_probability);
+        self.keys
+            .retain(|key| key.metric().asked != Asked::Probabilities);
         self
     }
 
     /// With no probability but that of the lesion.
     pub fn with_lesion_probability_alone(mut self) -> Self {
-        self.keys
-            .retain(|key| !key.metric().is_probability || key.metric().key == LESION_PROBABILITY);
+        self.keys.retain(|key| {
+            key.metric().asked != Asked::Probabilities || key.metric().key == LESION_PROBABILITY
+        });
         self
     }
 
     /// Without those that are of true targets alone.
     pub fn without_true_targets(mut self) -> Self {
-        self.keys.retain(|key| !key.metric().is_of_true_target);
+        self.keys
+            .retain(|key| key.metric().asked != Asked::OfTrueTargets);
         self
     }
 

@@ -500,7 +500,7 @@ fn probabilities_of_static_and_planned_cases_are_those_of_a_run() {
     let model = ClearanceModel::new(&resolved.cell);
     let setup = Setup::new(&resolved, &model).unwrap();
     let plan = setup.planner.plan(&resolved.goals[0]);
-    let of_run = probabilities(&setup, std::slice::from_ref(&plan), 2);
+    let of_run = probabilities(&setup, std::slice::from_ref(&plan), 2, false);
     let place = |keys: &[String], key: &str| keys.iter().position(|each| each == key).unwrap();
     let mut compared = 0;
     for (index, found) in of_run[0].iter().enumerate() {

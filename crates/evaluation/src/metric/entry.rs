@@ -193,6 +193,17 @@ pub enum Source {
     Engines(fn(&EngineReport) -> Option<f64>),
 }
 
+/// Studies that have columns of a metric.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asked {
+    /// All.
+    Always,
+    /// Those with a goal's true target, which it is of alone.
+    OfTrueTargets,
+    /// Those that ask for probabilities, which are estimated by draws of needles.
+    Probabilities,
+}
+
 /// One metric.
 #[derive(Debug, Clone, Copy)]
 pub struct Metric {
@@ -235,10 +246,8 @@ pub struct Metric {
     pub heading: Heading,
     /// Unit of its column in studies, and of its ranking key.
     pub unit: Unit,
-    /// Whether it is of a goal's true target alone: studies without any have no columns of it.
-    pub is_of_true_target: bool,
-    /// Whether it is estimated by draws of needles: studies have columns of it only where they ask for them.
-    pub is_probability: bool,
+    /// Which studies have columns of it.
+    pub asked: Asked,
     /// Whether studies have columns of each engine's value too.
     pub each_engine: bool,
     /// What a study's statistics do with it.
@@ -289,8 +298,7 @@ impl Metric {
                 case: None,
             },
             unit: quantity.column_unit(),
-            is_of_true_target: false,
-            is_probability: false,
+            asked: Asked::Always,
             each_engine: false,
             statistics: Statistics::NONE,
             static_statistics: Statistics::NONE,
@@ -472,14 +480,14 @@ impl Metric {
 
     pub(super) const fn of_true_target(self) -> Self {
         Self {
-            is_of_true_target: true,
+            asked: Asked::OfTrueTargets,
             ..self
         }
     }
 
     pub(super) const fn probability(self) -> Self {
         Self {
-            is_probability: true,
+            asked: Asked::Probabilities,
             ..self
         }
     }

@@ -16,8 +16,8 @@ mod resolution;
 mod table;
 
 pub use entry::{
-    Better, Bound, Criterion, Draw, Heading, Metric, Missing, Precision, Role, Show, Source, Stage,
-    Statistics,
+    Asked, Better, Bound, Criterion, Draw, Heading, Metric, Missing, Precision, Role, Show, Source,
+    Stage, Statistics,
 };
 pub use key::{MetricKey, set_measured};
 pub use quantity::{Quantity, Unit};

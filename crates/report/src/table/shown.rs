@@ -1,6 +1,6 @@
 //! Which metrics tables and pages show, and how.
 
-use needlebench_evaluation::metric::{Bound, Heading, Metric, MetricKey, Show, metrics};
+use needlebench_evaluation::metric::{Asked, Bound, Heading, Metric, MetricKey, Show, metrics};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 use needlebench_show::number::{millimetres, percent_with, small_length};
 
@@ -76,7 +76,7 @@ impl Shown {
     /// Whether there is anything to say of a goal: of true targets there is not where none is known.
     pub(crate) fn says_something(&self, goal: &GoalReport) -> bool {
         let mut all = goal.configurations.iter();
-        !self.metric().is_of_true_target || all.any(|each| self.value(each).is_some())
+        self.metric().asked != Asked::OfTrueTargets || all.any(|each| self.value(each).is_some())
     }
 
     /// The text, or a dash.
