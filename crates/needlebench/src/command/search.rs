@@ -30,8 +30,8 @@ use crate::progress::TerminalProgress;
 
 pub(crate) const SEARCH_HELP: &str = "\
 Control factors (`role = \"control\"`) are optimised; noise factors define the layouts that every candidate is evaluated \
-on. [search] in the study file selects the objective: a lower quantile of the constraint margin, the share of feasible layouts, or \
-the RMS tip error.
+on. [search] in the study file selects the objective: a lower quantile of the constraint margin, the share of feasible layouts, the \
+RMS tip error, or the probability of the lesion.
 
 Writes DIR/NAME/search.json, search.html and a folder for each generation, DIR/NAME/search/gen_000 and so on, each a \
 complete study. --resume continues an interrupted search. With --shard K/N a process computes its part of the next \
