@@ -22,9 +22,7 @@ pub(crate) fn probability_in_words(goal: &GoalReport) -> Option<String> {
     }
     if let (Some(any), Some(first)) = (&all.any, all.structures.first()) {
         let bound = any.at_most_of_1000.as_ref();
-        let bound = bound.map_or_else(String::new, |bound| {
-            format!(" (by a bound without draws {bound})")
-        });
+        let bound = bound.map_or_else(String::new, |bound| format!(" ({bound})"));
         let most_often = any.probability.map_or_else(String::new, |_| {
             format!(", most often to {}", part_in_words(&first.structure))
         });
@@ -44,7 +42,7 @@ pub(crate) fn probability_in_words(goal: &GoalReport) -> Option<String> {
         .collect();
     if !larger.is_empty() {
         parts.push(format!(
-            "with the assumed errors {ASSUMED_LARGER} times as large {}",
+            "assumed errors x {ASSUMED_LARGER}: {}",
             larger.join(" and ")
         ));
     }
